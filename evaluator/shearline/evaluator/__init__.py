@@ -1,0 +1,1 @@
+"""Run trials: tasks, skills and the worker that speaks to a learner."""

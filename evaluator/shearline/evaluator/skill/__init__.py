@@ -1,0 +1,1 @@
+"""The skill of the paper in three layers: semantic, manipulation, control."""

@@ -1,0 +1,1 @@
+"""Propose tuples and keep the run: learners, dispatcher, journal."""

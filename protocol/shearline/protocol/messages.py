@@ -1,0 +1,341 @@
+"""Every message that crosses the wire, as frozen typed values.
+
+A message is a msgpack map whose ``"type"`` names it, so that any msgpack library reads it.
+Identity is never a field: who sent a message is the evaluator chunk of the key it came on.
+Fields are only ever added, with a default; a change of meaning raises ``VERSION``.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+#: Spoken by both sides; a hello with another number is refused.
+VERSION = 1
+
+Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+Token = Annotated[str, Meta(min_length=8, max_length=64)]
+Text = Annotated[str, Meta(max_length=2048)]
+Count = Annotated[int, Meta(ge=0, le=2**62)]
+Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
+Seconds = Annotated[float, Meta(ge=0.0)]
+Tuple = Annotated[list[float], Meta(min_length=1, max_length=1024)]
+
+
+class OutcomeKind(enum.StrEnum):
+    """What an attempt ended as."""
+
+    SUCCESS = "success"
+    FAILURE = "failure"
+    ABORTED = "aborted"  # robot, operator or engine fault: never a cost
+    REJECTED = "rejected"  # out of the evaluator's own bounds: never a cost
+
+
+class Verdict(enum.StrEnum):
+    """What the learner did with a result."""
+
+    COUNTED = "counted"
+    LATE = "late"  # its episode had closed: kept, told with the next update
+    DUPLICATE = "duplicate"
+    UNKNOWN = "unknown"  # no such attempt was given to this evaluator
+    NOTED = "noted"  # aborted or rejected: on record, the trial is given out again
+
+
+class CommandKind(enum.StrEnum):
+    """What an operator, through the learner, asks of evaluators."""
+
+    HOLD = "hold"  # finish what runs, take nothing new
+    RESUME = "resume"
+    STOP = "stop"  # finish or abort what runs, then the run ends
+
+
+class Message(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", omit_defaults=False):
+    """Base of all messages."""
+
+
+class TaskSpec(msgspec.Struct, frozen=True, kw_only=True):
+    """What is being learned; both sides must mean the same thing by it.
+
+    Attributes:
+        name: ``"keylock"`` or the user's ``"file:function"``.
+        space: Parameter name to ``(unit, low, high)``, in order.
+        options: Whatever else decides the cost (level, limits), by name.
+        trial_s: Longest wall time one trial may take before it counts as hung [s].
+    """
+
+    name: Annotated[str, Meta(min_length=1, max_length=256)]
+    space: Annotated[dict[str, tuple[str, float, float]], Meta(min_length=1, max_length=1024)]
+    options: dict[str, str | float | bool] = {}
+    trial_s: Annotated[float, Meta(gt=0.0, le=86400.0)] = 60.0
+
+
+# -- evaluator to learner ---------------------------------------------------------------------
+
+
+class Hello(Message, frozen=True, kw_only=True, tag="hello"):
+    """An evaluator introduces one boot of itself; repeated until welcomed or refused.
+
+    Attributes:
+        boot: Random for each process start; separates two lives of one name.
+        version: Protocol version spoken.
+        task_digest: :func:`digest` of the task it would run; ``""`` if it takes the learner's.
+        kind: ``"simulator"``, ``"function"`` or ``"robot"``.
+        engine: Fingerprint of what runs its trials.
+        credits: Attempts it will hold at once, running and prefetched together.
+        slots: Trials it runs at once.
+    """
+
+    boot: Token
+    version: Count
+    task_digest: Annotated[str, Meta(max_length=64)]
+    kind: Annotated[str, Meta(max_length=32)]
+    engine: Text
+    credits: Annotated[int, Meta(ge=0, le=1024)]
+    slots: Annotated[int, Meta(ge=1, le=1024)] = 1
+
+
+class Credit(Message, frozen=True, kw_only=True, tag="credit"):
+    """An evaluator changes how many attempts it will hold at once (0: hand me nothing new).
+
+    Also its heartbeat while idle. ``seq`` grows by one each time, so that an old credit that
+    arrives late is ignored.
+    """
+
+    boot: Token
+    seq: Count
+    credits: Annotated[int, Meta(ge=0, le=1024)]
+
+
+class Renew(Message, frozen=True, kw_only=True, tag="renew"):
+    """The trial's own loop is alive: renews the leases of all tokens named."""
+
+    boot: Token
+    tokens: Annotated[list[Token], Meta(max_length=1024)]
+
+
+class Result(Message, frozen=True, kw_only=True, tag="result"):
+    """How an attempt ended; sent again until acknowledged.
+
+    Attributes:
+        token: The attempt's.
+        trial: The trial's number, for people; the token decides.
+        kind: What it ended as.
+        cost: In the task's unit; 0 unless success or failure.
+        seed: Seed it ran with.
+        engine: Fingerprint of what ran it.
+        digest: Digest of its trace, or ``""``.
+        wall_s: How long it ran [s].
+        why: Failure name or abort message.
+        extras: Further numbers worth keeping.
+    """
+
+    boot: Token
+    token: Token
+    trial: Count
+    kind: OutcomeKind
+    cost: float
+    seed: Seed
+    engine: Text = ""
+    digest: Annotated[str, Meta(max_length=128)] = ""
+    wall_s: Seconds = 0.0
+    why: Text = ""
+    extras: Annotated[dict[str, float], Meta(max_length=64)] = {}
+
+
+class Bye(Message, frozen=True, kw_only=True, tag="bye"):
+    """An evaluator leaves on purpose; what it holds may be given out again at once."""
+
+    boot: Token
+    why: Text = ""
+
+
+# -- learner to evaluator ---------------------------------------------------------------------
+
+
+class Welcome(Message, frozen=True, kw_only=True, tag="welcome"):
+    """The learner accepts a boot and says the rules of the run."""
+
+    boot: Token
+    epoch: Count
+    task: TaskSpec
+    lease_s: Annotated[float, Meta(gt=0.0, le=3600.0)]
+    held: bool = False
+
+
+class Refused(Message, frozen=True, kw_only=True, tag="refused"):
+    """The learner refuses a boot and says why."""
+
+    boot: Token
+    why: Text
+
+
+class Trial(Message, frozen=True, kw_only=True, tag="trial"):
+    """One attempt, handed to one evaluator."""
+
+    boot: Token
+    epoch: Count
+    trial: Count
+    episode: Count
+    attempt: Annotated[int, Meta(ge=1, le=1024)]
+    token: Token
+    theta: Tuple
+    seed: Seed
+    lease_s: Seconds
+    deadline_s: Seconds
+
+
+class Ack(Message, frozen=True, kw_only=True, tag="ack"):
+    """The learner has this result in its journal (or never wants it): stop sending it."""
+
+    boot: Token
+    token: Token
+    verdict: Verdict
+
+
+class Command(Message, frozen=True, kw_only=True, tag="command"):
+    """From the operator to the learner, and from the learner to evaluators."""
+
+    kind: CommandKind
+    why: Text = ""
+
+
+# -- to observers: dropped rather than ever slowing anyone --------------------------------------
+
+
+class Proposed(Message, frozen=True, kw_only=True, tag="proposed"):
+    """A trial came into being."""
+
+    trial: Count
+    episode: Count
+    theta: Tuple
+    seed: Seed
+
+
+class Counted(Message, frozen=True, kw_only=True, tag="counted"):
+    """A trial reached its one outcome (or was lost: ``kind`` is then ``None``).
+
+    Times are the learner's clock [s since the epoch].
+    """
+
+    trial: Count
+    episode: Count
+    theta: Tuple
+    kind: OutcomeKind | None
+    cost: float
+    seed: Seed
+    evaluator: Annotated[str, Meta(max_length=64)]
+    attempts: Count
+    late: bool
+    engine: Text
+    digest: Annotated[str, Meta(max_length=128)]
+    wall_s: Seconds
+    why: Text
+    extras: Annotated[dict[str, float], Meta(max_length=64)]
+    at_s: Seconds
+
+
+class EpisodeClosed(Message, frozen=True, kw_only=True, tag="episode"):
+    """An episode is complete.
+
+    ``mean_cost`` is over all its counted trials, ``best_cost`` over its successes.
+    """
+
+    episode: Count
+    trials: Count
+    successes: Count
+    success_rate: float
+    mean_cost: float | None
+    best_cost: float | None
+    at_s: Seconds
+
+
+class EvaluatorState(Message, frozen=True, kw_only=True, tag="evaluator"):
+    """Where one evaluator stands, said at every change."""
+
+    evaluator: Name
+    state: Annotated[str, Meta(max_length=32)]
+    kind: Annotated[str, Meta(max_length=32)] = ""
+    engine: Text = ""
+    running: Count = 0
+    done: Count = 0
+    lost: Count = 0
+    at_s: Seconds = 0.0
+
+
+class Snapshot(Message, frozen=True, kw_only=True, tag="snapshot"):
+    """The learner's model after an episode: JSON text, enough to draw it."""
+
+    episode: Count
+    learner: Text
+    model: Annotated[str, Meta(max_length=4_000_000)]
+    at_s: Seconds
+
+
+class Status(Message, frozen=True, kw_only=True, tag="status"):
+    """The run at a glance, said twice a second and at every change of episode.
+
+    Attributes:
+        state: ``"running"``, ``"held"``, ``"stopping"`` or ``"ended"``.
+        step_ms_max: Longest step of the learner's owner thread so far [ms].
+    """
+
+    run: Text
+    task: Text
+    learner: Text
+    epoch: Count
+    state: Annotated[str, Meta(max_length=32)]
+    episode: Count
+    episodes: Count
+    trials_per_episode: Count
+    pending: Count
+    leased: Count
+    done: Count
+    counted: Count
+    lost: Count
+    late: Count
+    duplicates: Count
+    aborted: Count
+    rejected: Count
+    rate_hz: float
+    step_ms_max: float
+    evaluators: list[EvaluatorState]
+    history: list[EpisodeClosed]
+    at_s: Seconds
+
+
+class TraceData(Message, frozen=True, kw_only=True, tag="trace"):
+    """One trial's trace: columns of little-endian float32 that share one trial clock.
+
+    Attributes:
+        names: Column names; the first is ``t_s``.
+        units: One for each column.
+        data: ``samples * len(names)`` float32, column after column.
+        events: ``(t_s, name)`` of phase changes.
+    """
+
+    trial: Count
+    token: Token
+    samples: Annotated[int, Meta(ge=0, le=1_000_000)]
+    names: Annotated[list[str], Meta(max_length=256)]
+    units: Annotated[list[str], Meta(max_length=256)]
+    data: bytes
+    events: Annotated[list[tuple[float, str]], Meta(max_length=256)] = []
+
+
+class Wire(Message, frozen=True, kw_only=True, tag="wire"):
+    """One protocol message as the learner saw or sent it, for the record."""
+
+    sent: bool
+    key: Text
+    payload: bytes
+    at_s: Seconds
+
+
+def digest(task: TaskSpec) -> str:
+    """Return 16 hexadecimal digits that differ when what is being learned differs."""
+    import hashlib  # noqa: PLC0415 - only here
+
+    return hashlib.sha256(msgspec.json.encode(task, order="sorted")).hexdigest()[:16]
