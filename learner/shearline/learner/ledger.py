@@ -1,0 +1,104 @@
+"""The ledger: which tuples were asked for, by number, and what became of each.
+
+It keeps what it is told as it was told (raw cost, success) and hands it out sorted by trial
+number, so that nothing downstream can depend on the order of arrival. It knows no algorithm.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from shearline.learner.base import Array
+from shearline.learner.errors import LearnerError
+
+
+@dataclass(frozen=True, slots=True)
+class Trials:
+    """Told outcomes, sorted by trial number.
+
+    Attributes:
+        number: Trial numbers ``(m,)``, rising.
+        u: Tuples in unit coordinates ``(m, n)``.
+        cost: Raw costs ``(m,)`` in the task's unit; a failure's cost is kept but means little.
+        success: Whether the task's goal was reached ``(m,)``.
+    """
+
+    number: npt.NDArray[np.int64]
+    u: Array
+    cost: Array
+    success: npt.NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.number)
+
+    def where(self, mask: npt.NDArray[np.bool_]) -> Trials:
+        """Return the trials that a mask ``(m,)`` selects, still in order."""
+        return Trials(self.number[mask], self.u[mask], self.cost[mask], self.success[mask])
+
+    def last(self, count: int) -> Trials:
+        """Return the latest ``count`` trials by number (all, if there are fewer)."""
+        start = max(0, len(self) - count)
+        return Trials(self.number[start:], self.u[start:], self.cost[start:], self.success[start:])
+
+
+class Ledger:
+    """Tuples by trial number and their outcomes.
+
+    Args:
+        n: Number of parameters.
+    """
+
+    def __init__(self, n: int) -> None:
+        self._n = n
+        self._asked: list[Array] = []
+        self._told: dict[int, tuple[float, bool]] = {}
+
+    @property
+    def asked(self) -> int:
+        """How many tuples have been asked for; also the next trial's number."""
+        return len(self._asked)
+
+    def add(self, u: Array) -> int:
+        """Enter one tuple ``(n,)`` in unit coordinates and return its trial number."""
+        self._asked.append(u)
+        return len(self._asked) - 1
+
+    def tell(self, trial: int, cost: float, *, success: bool) -> None:
+        """Enter one outcome; the same outcome told twice is ignored.
+
+        Raises:
+            LearnerError: If the trial was never asked for, has another outcome already, or its
+                cost is not a finite number.
+        """
+        if not 0 <= trial < len(self._asked):
+            raise LearnerError(
+                f"expected a trial that was asked for (0 to {len(self._asked) - 1}), got {trial}:"
+                " tell only what ask returned"
+            )
+        if not math.isfinite(cost):
+            raise LearnerError(
+                f"expected a finite cost for trial {trial}, got {cost!r}: report a failed trial"
+                " with success=False and the cost it is to be charged"
+            )
+        outcome = (float(cost), bool(success))
+        known = self._told.setdefault(trial, outcome)
+        if known != outcome:
+            raise LearnerError(
+                f"trial {trial} was told (cost, success) = {known} before, now {outcome}:"
+                " an outcome is final, drop the second one"
+            )
+
+    def trials(self) -> Trials:
+        """Return everything told so far, sorted by trial number."""
+        numbers = sorted(self._told)
+        outcomes = [self._told[k] for k in numbers]
+        return Trials(
+            number=np.array(numbers, dtype=np.int64),
+            u=np.array([self._asked[k] for k in numbers]).reshape(len(numbers), self._n),
+            cost=np.array([cost for cost, _ in outcomes], dtype=np.float64),
+            success=np.array([ok for _, ok in outcomes], dtype=np.bool_),
+        )
