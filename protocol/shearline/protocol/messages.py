@@ -16,8 +16,11 @@ from msgspec import Meta
 #: Spoken by both sides; a hello with another number is refused.
 VERSION = 1
 
-Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
-Token = Annotated[str, Meta(min_length=8, max_length=64)]
+# Names and tokens stand in keys, so they are plain; `$` alone would admit a final line feed.
+Name = Annotated[
+    str, Meta(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$(?!\n)")
+]
+Token = Annotated[str, Meta(min_length=8, max_length=64, pattern=r"^[A-Za-z0-9_-]*$(?!\n)")]
 Text = Annotated[str, Meta(max_length=2048)]
 Count = Annotated[int, Meta(ge=0, le=2**62)]
 Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
@@ -166,10 +169,14 @@ class Welcome(Message, frozen=True, kw_only=True, tag="welcome"):
 
 
 class Refused(Message, frozen=True, kw_only=True, tag="refused"):
-    """The learner refuses a boot and says why."""
+    """The learner refuses a boot and says why.
+
+    ``ended`` means that the run is over: nothing was wrong with the evaluator.
+    """
 
     boot: Token
     why: Text
+    ended: bool = False
 
 
 class Trial(Message, frozen=True, kw_only=True, tag="trial"):
@@ -323,6 +330,15 @@ class TraceData(Message, frozen=True, kw_only=True, tag="trace"):
     units: Annotated[list[str], Meta(max_length=256)]
     data: bytes
     events: Annotated[list[tuple[float, str]], Meta(max_length=256)] = []
+
+    def __post_init__(self) -> None:
+        """Refuse columns that do not fit together (msgspec turns this into its own error)."""
+        size = 4 * self.samples * len(self.names)
+        if len(self.units) != len(self.names) or len(self.data) != size:
+            raise ValueError(
+                f"expected a unit for each of {len(self.names)} names and {size} bytes,"
+                f" got {len(self.units)} units and {len(self.data)} bytes"
+            )
 
 
 class Wire(Message, frozen=True, kw_only=True, tag="wire"):

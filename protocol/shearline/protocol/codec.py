@@ -1,0 +1,190 @@
+"""The one door between bytes and messages: every foreign byte passes here and nowhere else.
+
+The order is the point: a size cap before anything is parsed, a typed decode that refuses what the
+message types do not allow, then a walk that refuses NaN and infinity. Whatever is wrong comes out
+as one :class:`~shearline.protocol.errors.ProtocolError`. The door does not know keys, sessions or
+who sent what; it never looks into the float32 columns of a trace.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from functools import cache
+from typing import Any, TypeVar, Union
+
+import msgspec
+
+from shearline.protocol.errors import ProtocolError
+from shearline.protocol.messages import (
+    Ack,
+    Bye,
+    Command,
+    Counted,
+    Credit,
+    EpisodeClosed,
+    EvaluatorState,
+    Hello,
+    Message,
+    Proposed,
+    Refused,
+    Renew,
+    Result,
+    Snapshot,
+    Status,
+    TraceData,
+    Trial,
+    Welcome,
+    Wire,
+)
+
+M = TypeVar("M", bound=Message)
+
+#: A trial of 1024 parameters takes 9 KiB, a welcome with 1024 named bounds about 40 KiB.
+CONTROL_BYTES_MAX = 64 * 1024
+
+#: A trace of 60 s at 1 kHz with 32 columns takes 7.7 MB.
+BULK_BYTES_MAX = 8 * 1024 * 1024
+
+#: Kinds that may be larger than a control message; all of them travel on observer keys only.
+BULK: frozenset[type[Message]] = frozenset({Snapshot, Status, TraceData, Wire})
+
+#: What a learner reads from evaluators, what an evaluator reads from the learner, and so on.
+TO_LEARNER: tuple[type[Message], ...] = (Hello, Credit, Renew, Result, Bye)
+TO_EVALUATOR: tuple[type[Message], ...] = (Welcome, Refused, Trial, Ack, Command)
+FROM_OPERATOR: tuple[type[Message], ...] = (Command,)
+TO_OBSERVER: tuple[type[Message], ...] = (
+    Proposed,
+    Counted,
+    EpisodeClosed,
+    EvaluatorState,
+    Snapshot,
+    Status,
+    TraceData,
+    Wire,
+)
+
+#: Enough of a foreign sentence to find the mistake, too little to fill a log.
+_REASON_CHARS_MAX = 200
+
+#: What msgspec raises for bytes that are not the message they claim to be. A ValidationError is a
+#: DecodeError; RecursionError comes from deep nesting in an unknown field.
+_FOREIGN_FAULTS = (
+    msgspec.DecodeError,
+    UnicodeDecodeError,
+    RecursionError,
+    OverflowError,
+    MemoryError,
+)
+
+
+class _Nothing(Message, frozen=True, kw_only=True, tag=""):
+    """The second kind beside a single one; nobody may send it."""
+
+
+_INERT = frozenset({str, int, bool, bytes, type(None)})
+
+_encoder = msgspec.msgpack.Encoder()
+
+
+def decode(data: bytes, *kinds: type[M]) -> M:
+    """Read one message of the given kinds from msgpack.
+
+    Args:
+        data: One whole message.
+        kinds: The message types that may come here, e.g. :data:`TO_LEARNER`.
+
+    Raises:
+        ProtocolError: If the bytes are too many, malformed, or of no admitted kind.
+    """
+    limit, decoder = _door(kinds)
+    if len(data) > limit:
+        raise ProtocolError(f"expected at most {limit} bytes, got {len(data)}: message refused")
+    try:
+        message: M = decoder.decode(data)
+    except _FOREIGN_FAULTS as fault:
+        raise ProtocolError(f"expected {_names(kinds)}, got {_reason(fault)}") from None
+    if isinstance(message, _Nothing):
+        raise ProtocolError(f"expected {_names(kinds)}, got a message without a kind")
+    if len(data) > bytes_max(type(message)):
+        raise ProtocolError(
+            f"expected at most {bytes_max(type(message))} bytes of {_names((type(message),))},"
+            f" got {len(data)}: message refused"
+        )
+    if not is_finite(message):
+        raise ProtocolError(
+            f"expected finite numbers in {_names((type(message),))}, got NaN or infinity"
+        )
+    return message
+
+
+def encode(message: Message) -> bytes:
+    """Write one message as a msgpack map whose ``"type"`` names it.
+
+    What is written passes :func:`decode`: a message that every peer would silently drop is a
+    mistake of this program and is found here, not by a result that is sent again for ever.
+
+    Raises:
+        ValueError: If a number is not finite, a field breaks its type, or it is too large.
+    """
+    kind = type(message)
+    if not is_finite(message):
+        raise ValueError(f"a {_names((kind,))} to send has a NaN or infinite number: {message!r}")
+    try:
+        data = _encoder.encode(message)
+        _door((kind,))[1].decode(data)
+    except (msgspec.MsgspecError, UnicodeError, OverflowError, TypeError) as fault:
+        raise ValueError(f"a {_names((kind,))} to send is malformed: {_reason(fault)}") from fault
+    if len(data) > bytes_max(kind):
+        raise ValueError(
+            f"a {_names((kind,))} to send has {len(data)} bytes, more than {bytes_max(kind)}"
+        )
+    return data
+
+
+def bytes_max(kind: type[Message]) -> int:
+    """Return the largest encoded size of one kind of message [bytes]."""
+    return BULK_BYTES_MAX if kind in BULK else CONTROL_BYTES_MAX
+
+
+def is_finite(value: object) -> bool:
+    """Tell whether no float anywhere in a message or plain value is NaN or infinite."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, msgspec.Struct):
+        fields = (getattr(value, name) for name in value.__struct_fields__)
+        return all(is_finite(field) for field in fields if type(field) not in _INERT)
+    if isinstance(value, list | tuple):
+        return _all_finite(value)
+    if isinstance(value, dict):
+        return _all_finite(value.values())
+    return True
+
+
+def _all_finite(values: Collection[Any]) -> bool:
+    try:
+        # A tuple of parameters, at the speed of C: this walk is in every round trip.
+        return all(map(math.isfinite, values))
+    except TypeError:
+        return all(map(is_finite, values))
+
+
+@cache
+def _door(kinds: tuple[type[Message], ...]) -> tuple[int, msgspec.msgpack.Decoder[Any]]:
+    if not kinds:
+        raise TypeError("decode() needs at least one kind of message")
+    # Alone, a tagged struct is decoded without its tag; as one of two, never.
+    decoder = msgspec.msgpack.Decoder(Union[(*kinds, _Nothing)])
+    return max(map(bytes_max, kinds)), decoder
+
+
+@cache
+def _names(kinds: tuple[type[Message], ...]) -> str:
+    return " or ".join(str(kind.__struct_config__.tag) for kind in kinds)
+
+
+def _reason(fault: BaseException) -> str:
+    text = " ".join(str(fault).split()) or type(fault).__name__
+    printable = "".join(c if c.isprintable() else "?" for c in text)
+    short = printable[:_REASON_CHARS_MAX]
+    return short if short == printable else short + "..."

@@ -1,0 +1,339 @@
+"""Zenoh sessions: the settings that were measured, and a life cycle that never hangs.
+
+The learner's session is the router of a star; everyone else is its client. Callbacks only put
+into a queue, errors are one sentence, closing is bounded. This module moves bytes between keys:
+it knows neither messages nor what a run is about. Sessions do not survive ``fork``: processes
+that use one are spawned.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import re
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, Self
+
+from shearline.protocol.codec import BULK_BYTES_MAX
+from shearline.protocol.errors import LinkError
+from shearline.protocol.keys import ANY_LEARNER, parse
+
+if TYPE_CHECKING:
+    import zenoh
+
+#: Silence after which a peer counts as gone [ms]; 500 ms gave false alarms on a loaded machine.
+LEASE_MS = 2000
+
+#: Evaluators, observers and operators that one learner admits.
+SESSIONS_MAX = 4096
+
+#: Longest single attempt to connect, so that Ctrl-C and a deadline are noticed in between [s].
+_SLICE_S = 0.5
+
+_ENDPOINT = re.compile(
+    r"(tcp|tls|quic|udp|ws)/(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[\w.-]+):(?P<port>\d{1,5})([?#]\S*)?",
+    re.ASCII,
+)
+
+#: For both sides. What is not spelled here is Zenoh's default, which listens on every interface
+#: and joins any network it finds: never open a session from a bare configuration.
+_COMMON: Mapping[str, object] = {
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": False,
+    # Waits for scouts that are off: costs half a second at every start of a router.
+    "scouting/delay": 0,
+    # Gains nothing at these sizes, and size limits are not enforced on it.
+    "transport/shared_memory/enabled": False,
+    "transport/link/tx/lease": LEASE_MS,
+    "connect/retry": {"period_init_ms": 50, "period_max_ms": 400, "period_increase_factor": 2},
+    # A put to a stopped process else blocks the sender for 5 s.
+    "transport/link/tx/queue/congestion_control/block/wait_before_close": 500_000,
+    "transport/link/rx/max_message_size": 2 * BULK_BYTES_MAX,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """Bytes that came in on a key."""
+
+    key: str
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Presence:
+    """A liveliness token appeared (``alive``) or vanished."""
+
+    key: str
+    alive: bool
+
+
+class Link:
+    """One open session.
+
+    Threads may publish at the same time; everything else belongs to the thread that opened it.
+
+    Args:
+        session: Open session, owned from here on.
+        endpoint: Where it listens or what it connects to, for messages to people.
+    """
+
+    def __init__(self, session: zenoh.Session, endpoint: str) -> None:
+        import zenoh  # noqa: PLC0415 - 30 ms that a command without a network need not pay
+
+        self.endpoint = endpoint
+        self._session = session
+        self._block = zenoh.CongestionControl.BLOCK
+        self._drop = zenoh.CongestionControl.DROP
+        self._put = zenoh.SampleKind.PUT
+        self._declared: list[Any] = []
+        self._closed = False
+        # An open session with a callback hangs the interpreter's exit.
+        atexit.register(self.close)
+
+    def publish(self, key: str, payload: bytes) -> None:
+        """Send bytes in order and without loss while the connection lasts; else they vanish.
+
+        Blocks for at most half a second on a peer that stopped reading.
+        """
+        self._session.put(key, payload, congestion_control=self._block)
+
+    def observe(self, key: str, payload: bytes) -> None:
+        """Send bytes that may be dropped and never make the sender wait."""
+        self._session.put(key, payload, congestion_control=self._drop)
+
+    def subscribe(self, pattern: str, inbox: SimpleQueue[Any]) -> None:
+        """Put an :class:`Arrival` into ``inbox`` for everything that comes on a pattern."""
+
+        def enqueue(sample: zenoh.Sample) -> None:
+            inbox.put(Arrival(str(sample.key_expr), sample.payload.to_bytes()))
+
+        self._declared.append(self._session.declare_subscriber(pattern, enqueue))
+
+    def watch(self, pattern: str, inbox: SimpleQueue[Any]) -> None:
+        """Put a :class:`Presence` into ``inbox`` for each token there is, comes or goes."""
+
+        def enqueue(sample: zenoh.Sample) -> None:
+            inbox.put(Presence(str(sample.key_expr), sample.kind == self._put))
+
+        tokens = self._session.liveliness()
+        self._declared.append(tokens.declare_subscriber(pattern, enqueue, history=True))
+
+    @contextmanager
+    def watching(self, pattern: str, inbox: SimpleQueue[Any]) -> Iterator[None]:
+        """Like :meth:`watch`, for as long as the block lasts."""
+        self.watch(pattern, inbox)
+        watcher = self._declared.pop()
+        try:
+            yield
+        finally:
+            watcher.undeclare()
+
+    def announce(self, key: str) -> None:
+        """Declare a liveliness token, held until the link closes: last, when all else is ready."""
+        self._declared.append(self._session.liveliness().declare_token(key))
+
+    def is_connected(self) -> bool:
+        """Tell whether at least one other session is connected."""
+        return bool(self._session.info.transports())
+
+    def close(self, timeout_s: float = 1.0) -> bool:
+        """Close the session, in the background after ``timeout_s`` (12.7 s on a frozen peer).
+
+        Returns:
+            Whether it closed in time; if not, end the process with ``os._exit``.
+        """
+        if self._closed:
+            return True
+        self._closed = True
+        atexit.unregister(self.close)
+        closer = threading.Thread(target=self._session.close, daemon=True)
+        closer.start()
+        closer.join(timeout_s)
+        return not closer.is_alive()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def open_router(listen: str, *, settings: Mapping[str, object] | None = None) -> Link:
+    """Open the learner's session and listen.
+
+    Args:
+        listen: Endpoint, e.g. ``"tcp/0.0.0.0:7447"``.
+        settings: Further Zenoh settings by path (TLS, access control).
+
+    Raises:
+        LinkError: If the endpoint is malformed, taken or not of this machine.
+    """
+    import zenoh  # noqa: PLC0415 - as above
+
+    chosen = {
+        "mode": "router",
+        "listen/endpoints": [check_endpoint(listen)],
+        "connect/endpoints": [],
+        "transport/unicast/max_sessions": SESSIONS_MAX,
+        "transport/unicast/accept_pending": SESSIONS_MAX,
+        **(settings or {}),
+    }
+    try:
+        return Link(_open(chosen), listen)
+    except zenoh.ZError as fault:
+        raise LinkError(_why_not_listening(listen, str(fault))) from None
+
+
+def open_client(
+    connect: str,
+    timeout_s: float | None = 5.0,
+    *,
+    cancelled: Callable[[], bool] | None = None,
+    settings: Mapping[str, object] | None = None,
+) -> Link:
+    """Open a session as a client of the learner; it reconnects by itself from then on.
+
+    Args:
+        connect: The learner's endpoint, e.g. ``"tcp/192.168.1.5:7447"``.
+        timeout_s: How long to try [s]; ``None`` tries for ever.
+        cancelled: Asked at least every 0.5 s; true ends the attempt.
+        settings: Further Zenoh settings by path (TLS).
+
+    Raises:
+        LinkError: If the endpoint is malformed, or nobody answers in time.
+    """
+    import zenoh  # noqa: PLC0415 - as above
+
+    check_endpoint(connect)
+    end_s = _end_s(timeout_s)
+    while True:
+        slice_s = min(_SLICE_S, max(end_s - time.monotonic(), 0.05))
+        chosen = {
+            "mode": "client",
+            "connect/endpoints": [connect],
+            "listen/endpoints": [],
+            "connect/timeout_ms": round(1000 * slice_s),
+            **(settings or {}),
+        }
+        try:
+            return Link(_open(chosen), connect)
+        except zenoh.ZError as fault:
+            if "Unable to connect" not in str(fault):
+                raise LinkError(f"cannot connect to {connect}: {_plain(str(fault))}") from None
+        if cancelled is not None and cancelled():
+            raise LinkError(f"stopped waiting for a learner at {connect}")
+        if timeout_s is not None and time.monotonic() >= end_s:
+            raise LinkError(_why_nobody(connect, timeout_s))
+
+
+def discover(
+    link: Link,
+    timeout_s: float | None = 5.0,
+    *,
+    cancelled: Callable[[], bool] | None = None,
+) -> tuple[str, int]:
+    """Wait for a learner to be alive.
+
+    Returns:
+        Its run's name and its epoch; the newest epoch where several are seen.
+
+    Raises:
+        LinkError: If none shows up in time.
+    """
+    inbox: SimpleQueue[Presence] = SimpleQueue()
+    alive: set[tuple[str, int]] = set()
+    end_s = _end_s(timeout_s)
+    with link.watching(ANY_LEARNER, inbox):
+        while True:
+            note_learners(alive, inbox, min(_SLICE_S, max(end_s - time.monotonic(), 0.0)))
+            if alive:
+                return max(alive, key=lambda learner: learner[1])
+            if cancelled is not None and cancelled():
+                raise LinkError(f"stopped waiting for a learner at {link.endpoint}")
+            if time.monotonic() >= end_s:
+                raise LinkError(
+                    f"connected to {link.endpoint}, but no learner is alive there within"
+                    f" {timeout_s:g} s: start one"
+                )
+
+
+def note_learners(alive: set[tuple[str, int]], inbox: SimpleQueue[Presence], wait_s: float) -> None:
+    """Bring ``(run, epoch)`` of living learners up to date from what a watch has put in."""
+    try:
+        presence = inbox.get(timeout=wait_s)
+        while True:
+            address = parse(presence.key)
+            learner = (address.run, int(address.life))
+            alive.add(learner) if presence.alive else alive.discard(learner)
+            presence = inbox.get_nowait()
+    except Empty:
+        return
+
+
+def free_endpoint(host: str = "127.0.0.1") -> str:
+    """Return an endpoint that was free a moment ago."""
+    with socket.socket() as probe:
+        probe.bind((host, 0))
+        return f"tcp/{host}:{probe.getsockname()[1]}"
+
+
+def check_endpoint(endpoint: str) -> str:
+    """Return an endpoint that is well-formed.
+
+    Raises:
+        LinkError: If it is not.
+    """
+    match = _ENDPOINT.fullmatch(endpoint)
+    if match is None or not 0 <= int(match["port"]) < 2**16:
+        raise LinkError(
+            f"expected an endpoint such as tcp/192.168.1.5:7447, got {endpoint[:200]!r}: correct it"
+        )
+    return endpoint
+
+
+def _open(settings: Mapping[str, object]) -> zenoh.Session:
+    import zenoh  # noqa: PLC0415 - as above
+
+    config = zenoh.Config()
+    for path, value in {**_COMMON, **settings}.items():
+        config.insert_json5(path, json.dumps(value))
+    return zenoh.open(config)
+
+
+def _why_not_listening(endpoint: str, fault: str) -> str:
+    for sign, why in (
+        ("Address already in use", "it is taken: choose another port, or stop what listens there"),
+        ("Cannot assign requested", "it is not an address of this machine: correct it"),
+        ("Permission denied", "this user may not: choose a port above 1023"),
+    ):
+        if sign in fault:
+            return f"cannot listen at {endpoint}: {why}"
+    return f"cannot listen at {endpoint}: {_plain(fault)}"
+
+
+def _why_nobody(endpoint: str, timeout_s: float) -> str:
+    match = _ENDPOINT.fullmatch(endpoint)
+    try:
+        socket.getaddrinfo(match and match["host"].strip("[]"), None)
+    except OSError:
+        return f"cannot find the host of {endpoint}: correct its name"
+    return (
+        f"nobody answers at {endpoint} within {timeout_s:g} s:"
+        " start the learner there, or correct the endpoint"
+    )
+
+
+def _plain(fault: str) -> str:
+    """Cut what only Zenoh's authors need: paths of its sources."""
+    return re.sub(r" at /\S+", "", fault)[:200]
+
+
+def _end_s(timeout_s: float | None) -> float:
+    return time.monotonic() + (float("inf") if timeout_s is None else timeout_s)
