@@ -17,7 +17,7 @@ def _controller() -> Any:
     import sklearn.mixture  # noqa: PLC0415 - heavy, at the first fit
     import sklearn.svm  # noqa: F401, PLC0415
 
-    # type: ignore because the package ships no type information
+    # It ships no type information.
     from threadpoolctl import (  # type: ignore[import-untyped]  # noqa: PLC0415
         ThreadpoolController,
     )

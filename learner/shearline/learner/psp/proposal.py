@@ -50,7 +50,8 @@ class Mixture:
         """Return ``(count, n)`` draws, not confined to the cube."""
         component = rng.choice(len(self.weights), size=count, p=self.weights)
         normal = rng.standard_normal((count, self.means.shape[1]))
-        return self.means[component] + np.einsum("mij,mj->mi", self.factors[component], normal)
+        offset: Array = np.einsum("mij,mj->mi", self.factors[component], normal)
+        return self.means[component] + offset
 
     def snapshot(self) -> Mapping[str, object]:
         """Return weights, means and covariances as plain lists."""
