@@ -1,0 +1,49 @@
+# Two commands on a fresh machine with Python 3.11: `make demo` and `make test`.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+
+.PHONY: help demo test lint types quick slow chaos bench docs-images clean
+
+help:  ## say what can be made
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+# The stamp is younger than what decides the install, so that a second `make` costs nothing.
+$(INSTALLED): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "Shearline needs Python 3.11 or newer, found $$($(PYTHON) --version): set PYTHON=python3.11" >&2; exit 2; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { \
+	  echo "python's venv module is missing: install it (Debian: python3-venv)" >&2; exit 2; }
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt pip
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	  --editable '.[all]' --group dev
+	@touch $@
+
+demo: $(INSTALLED)  ## install, learn the key-in-lock with two MuJoCo evaluators, say how to replay
+	$(BIN)/shearline up --task keylock --evaluators 2 --episodes 10 --trials 20 --seed 0
+
+test: $(INSTALLED) lint types  ## everything CI checks
+	$(BIN)/python -m pytest -m "not slow and not chaos and not bench" -n 2 --dist worksteal -q \
+	  --cov --cov-report= 
+	$(BIN)/python -m pytest -m "(slow or chaos or bench) and not long" -q --cov --cov-append --cov-report=
+	$(BIN)/python -m coverage report --include='*/shearline/protocol/*,*/learner/dispatcher*' \
+	  --fail-under=95
+
+lint: $(INSTALLED)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+
+types: $(INSTALLED)
+	$(BIN)/mypy
+
+quick: $(INSTALLED)  ## the quick suite alone
+	$(BIN)/python -m pytest -m "not slow and not chaos and not bench" -n 2 --dist worksteal -q
+
+bench: $(INSTALLED)  ## side by side with the physical limit
+	$(BIN)/shearline bench sim
+	$(BIN)/shearline bench learner
+
+clean:  ## remove what was built; runs stay
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage* build dist
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
