@@ -1,0 +1,74 @@
+"""Arguments that several commands share, each defined once."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import TypeAlias
+
+# argparse gives what add_subparsers() returns no public name.
+Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001
+
+#: Where a learner listens when nobody says otherwise: this machine only.
+ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def positive(text: str) -> int:
+    """Parse a whole number of at least 1."""
+    return at_least(1)(text)
+
+
+def at_least(low: int) -> Callable[[str], int]:
+    """Return a parser of whole numbers of at least ``low``."""
+
+    def parse(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            number = low - 1
+        if number < low:
+            raise argparse.ArgumentTypeError(f"expected a whole number >= {low}, got {text!r}")
+        return number
+
+    return parse
+
+
+def seconds(text: str) -> float:
+    """Parse a positive, finite time [s]."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1e6:
+        raise argparse.ArgumentTypeError(f"expected seconds > 0, got {text!r}")
+    return value
+
+
+def add_json(command: argparse.ArgumentParser) -> None:
+    """``--json``: print for programs instead of people."""
+    command.add_argument("--json", action="store_true", help="print JSON for programs")
+
+
+def add_connect(command: argparse.ArgumentParser) -> None:
+    """``--connect``: the learner's endpoint."""
+    command.add_argument(
+        "--connect",
+        default=ENDPOINT,
+        metavar="ENDPOINT",
+        help=f"the learner's endpoint (default {ENDPOINT})",
+    )
+
+
+def add_run(command: argparse.ArgumentParser) -> None:
+    """Arguments that say what a run is; each overrides the TOML file, if one is given."""
+    group = command.add_argument_group("the run")
+    group.add_argument(
+        "--task", help="keylock, keylock-limit, keylock-jam, sphere, or file:function"
+    )
+    group.add_argument("--learner", help="psp (default), psp-paper, lhs, random")
+    group.add_argument("--episodes", type=positive, metavar="K", help="updates (default 10)")
+    group.add_argument("--trials", type=positive, metavar="N", help="per episode (default 20)")
+    group.add_argument("--seed", type=at_least(0), metavar="S", help="default 0")
+    group.add_argument("--lease", type=seconds, metavar="S", help="lease of an attempt [s]")
+    group.add_argument("--out", metavar="RUN_DIR", help="run folder (default runs/TASK-TIME)")
+    group.add_argument("--no-record", action="store_true", help="write no record.mcap")

@@ -1,0 +1,101 @@
+"""The live table: a status message drawn for people. Knows rich and nothing else."""
+
+from __future__ import annotations
+
+import math
+
+from rich.console import Group, RenderableType
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from shearline.protocol.messages import EpisodeClosed, EvaluatorState, Status
+
+#: Episodes shown at once; the last ones matter.
+EPISODES_SHOWN = 12
+#: Evaluators shown at once.
+EVALUATORS_SHOWN = 16
+STATE_STYLE = {"busy": "green", "idle": "cyan", "lost": "red", "held": "yellow"}
+
+
+def render(status: Status) -> RenderableType:
+    """Draw the run: headline, progress, episodes and evaluators."""
+    return Group(
+        _headline(status), _progress(status), _episodes(status), _evaluators(status.evaluators)
+    )
+
+
+def time_left_s(status: Status) -> float:
+    """Return the time left at the present rate [s]; infinite while nothing is known."""
+    left = status.episodes * status.trials_per_episode - status.counted - status.lost
+    return left / status.rate_hz if status.rate_hz > 0.0 else math.inf
+
+
+def duration(time_s: float) -> str:
+    """Write a duration for people: ``"2:05"``, or ``"-"`` where it is not known."""
+    if not math.isfinite(time_s):
+        return "-"
+    minutes, rest_s = divmod(round(time_s), 60)
+    return f"{minutes}:{rest_s:02d}"
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Write a number for people, or ``"-"`` where there is none."""
+    return "-" if value is None or not math.isfinite(value) else f"{value:.{digits}f}"
+
+
+def _headline(status: Status) -> Text:
+    losses = {
+        "lost": status.lost,
+        "late": status.late,
+        "duplicates": status.duplicates,
+        "aborted": status.aborted,
+        "rejected": status.rejected,
+    }
+    said = [f"{count} {name}" for name, count in losses.items() if count]
+    text = Text.assemble((status.run, "bold"), f"  {status.task}, {status.learner}, {status.state}")
+    return text.append("  " + ", ".join(said), style="yellow") if said else text
+
+
+def _progress(status: Status) -> Table:
+    row = Table.grid(padding=(0, 2))
+    total = max(1, status.episodes * status.trials_per_episode)
+    done = status.counted + status.lost
+    row.add_row(
+        ProgressBar(total=total, completed=min(done, total), width=40),
+        f"{status.counted} of {total} trials counted",
+        f"{status.rate_hz:.2f} trials/s",
+        f"{duration(time_left_s(status))} left",
+    )
+    return row
+
+
+def _episodes(status: Status) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2))
+    for name in ("episode", "success", "", "mean cost", "best cost"):
+        table.add_column(name, justify="left" if not name else "right")
+    for episode in status.history[-EPISODES_SHOWN:]:
+        table.add_row(*_episode_row(episode, status.episodes))
+    return table
+
+
+def _episode_row(episode: EpisodeClosed, episodes: int) -> tuple[RenderableType, ...]:
+    return (
+        f"{episode.episode + 1}/{episodes}",
+        f"{episode.success_rate:.0%}",
+        ProgressBar(total=1.0, completed=episode.success_rate, width=20),
+        number(episode.mean_cost),
+        number(episode.best_cost),
+    )
+
+
+def _evaluators(evaluators: list[EvaluatorState]) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2))
+    for name in ("evaluator", "state", "running", "done", "lost"):
+        table.add_column(name, justify="left" if name in {"evaluator", "state"} else "right")
+    for one in evaluators[:EVALUATORS_SHOWN]:
+        state = Text(one.state, style=STATE_STYLE.get(one.state, ""))
+        table.add_row(one.evaluator, state, str(one.running), str(one.done), str(one.lost))
+    if len(evaluators) > EVALUATORS_SHOWN:
+        table.add_row(f"and {len(evaluators) - EVALUATORS_SHOWN} more", "", "", "", "")
+    return table
