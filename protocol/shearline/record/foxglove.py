@@ -1,0 +1,114 @@
+"""The standard ``foxglove.*`` types that the record uses, with their published field numbers.
+
+Written down here so that neither protoc nor another package is needed; a viewer recognises them
+by name. Nothing else about Foxglove is known here.
+"""
+
+from __future__ import annotations
+
+import enum
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto
+
+from shearline.protocol.messages import TraceData
+
+#: Poses kept of one tip path: enough for a smooth line, a hundredth of a trace's size.
+TIP_POSES_MAX = 200
+TIP_AXES = ("tip.x", "tip.y", "tip.z")
+
+_TYPES = {
+    "string": FieldDescriptorProto.TYPE_STRING,
+    "double": FieldDescriptorProto.TYPE_DOUBLE,
+    "fixed32": FieldDescriptorProto.TYPE_FIXED32,
+}
+_TIME = ".google.protobuf.Timestamp"
+
+#: Message to its fields in order of their numbers 1, 2, ...; ``[]`` marks a repeated one.
+_MESSAGES: dict[str, tuple[tuple[str, str], ...]] = {
+    "Vector3": (("x", "double"), ("y", "double"), ("z", "double")),
+    "Quaternion": (("x", "double"), ("y", "double"), ("z", "double"), ("w", "double")),
+    "Pose": (("position", ".foxglove.Vector3"), ("orientation", ".foxglove.Quaternion")),
+    "PosesInFrame": (("timestamp", _TIME), ("frame_id", "string"), ("poses", ".foxglove.Pose[]")),
+    "Log": (
+        ("timestamp", _TIME),
+        ("level", ".foxglove.Log.Level"),
+        ("message", "string"),
+        ("name", "string"),
+        ("file", "string"),
+        ("line", "fixed32"),
+    ),
+}
+
+
+class Level(enum.IntEnum):
+    """Severity of a ``foxglove.Log``."""
+
+    UNKNOWN = 0
+    DEBUG = 1
+    INFO = 2
+    WARNING = 3
+    ERROR = 4
+    FATAL = 5
+
+
+@functools.cache
+def foxglove_file() -> FileDescriptorProto:
+    """Return one descriptor file with all the types above."""
+    file = FileDescriptorProto(name="foxglove/shearline.proto", package="foxglove", syntax="proto3")
+    file.dependency.append("google/protobuf/timestamp.proto")
+    for name, fields in _MESSAGES.items():
+        message = file.message_type.add(name=name)
+        for number, (field_name, kind) in enumerate(fields, start=1):
+            _set_type(message.field.add(name=field_name, number=number), kind)
+        if name == "Log":
+            levels = message.enum_type.add(name="Level")
+            for level in Level:
+                levels.value.add(name=level.name, number=level.value)
+    return file
+
+
+def log_line(level: Level, text: str, at_ns: int) -> dict[str, Any]:
+    """Return the values of one ``foxglove.Log``, said at ``at_ns`` [ns since the epoch]."""
+    return {
+        "timestamp": _time(at_ns),
+        "level": int(level),
+        "message": text,
+        "name": "recorder",
+    }
+
+
+def tip_path(trace: TraceData, at_ns: int) -> dict[str, Any] | None:
+    """Return the values of a ``foxglove.PosesInFrame``, or ``None`` if the trace has no tip."""
+    if not set(TIP_AXES) <= set(trace.names) or not trace.samples:
+        return None
+    columns = np.frombuffer(trace.data, dtype="<f4").reshape(len(trace.names), trace.samples)
+    path = columns[[trace.names.index(axis) for axis in TIP_AXES]]
+    thin = path[:, :: -(-trace.samples // TIP_POSES_MAX)].astype(float)
+    poses = [_pose(x, y, z) for x, y, z in thin.T.tolist()]
+    return {"timestamp": _time(at_ns), "frame_id": "world", "poses": poses}
+
+
+def _pose(x: float, y: float, z: float) -> Mapping[str, Any]:
+    return {"position": {"x": x, "y": y, "z": z}, "orientation": {"w": 1.0}}
+
+
+def _time(at_ns: int) -> dict[str, int]:
+    return {"seconds": at_ns // 10**9, "nanos": at_ns % 10**9}
+
+
+def _set_type(field: FieldDescriptorProto, kind: str) -> None:
+    repeated = kind.endswith("[]")
+    name = kind.removesuffix("[]")
+    field.label = (
+        FieldDescriptorProto.LABEL_REPEATED if repeated else FieldDescriptorProto.LABEL_OPTIONAL
+    )
+    if name in _TYPES:
+        field.type = _TYPES[name]
+        return
+    enumerated = name.endswith(".Level")
+    field.type = FieldDescriptorProto.TYPE_ENUM if enumerated else FieldDescriptorProto.TYPE_MESSAGE
+    field.type_name = name
