@@ -8,7 +8,6 @@ that use one are spawned.
 
 from __future__ import annotations
 
-import atexit
 import json
 import re
 import socket
@@ -17,8 +16,10 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Self
+from weakref import WeakSet
 
 from shearline.protocol.codec import BULK_BYTES_MAX
 from shearline.protocol.errors import LinkError
@@ -57,6 +58,8 @@ _COMMON: Mapping[str, object] = {
     "transport/link/rx/max_message_size": 2 * BULK_BYTES_MAX,
 }
 
+_open_links: WeakSet[Link] = WeakSet()
+
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
@@ -94,8 +97,8 @@ class Link:
         self._put = zenoh.SampleKind.PUT
         self._declared: list[Any] = []
         self._closed = False
-        # An open session with a callback hangs the interpreter's exit.
-        atexit.register(self.close)
+        _open_links.add(self)
+        _guard_exit()
 
     def publish(self, key: str, payload: bytes) -> None:
         """Send bytes in order and without loss while the connection lasts; else they vanish.
@@ -152,7 +155,6 @@ class Link:
         if self._closed:
             return True
         self._closed = True
-        atexit.unregister(self.close)
         closer = threading.Thread(target=self._session.close, daemon=True)
         closer.start()
         closer.join(timeout_s)
@@ -296,6 +298,23 @@ def check_endpoint(endpoint: str) -> str:
             f"expected an endpoint such as tcp/192.168.1.5:7447, got {endpoint[:200]!r}: correct it"
         )
     return endpoint
+
+
+@cache
+def _guard_exit() -> None:
+    """See that a link somebody forgot to close cannot hang the interpreter.
+
+    Zenoh calls back from threads that Python waits for before it runs ``atexit`` functions; a
+    thread that waits for the main thread comes before both. It is no daemon: those are cut off
+    in mid-close, which aborts the process.
+    """
+
+    def close_all() -> None:
+        threading.main_thread().join()
+        for link in list(_open_links):
+            link.close()
+
+    threading.Thread(target=close_all, name="link-exit").start()
 
 
 def _open(settings: Mapping[str, object]) -> zenoh.Session:
