@@ -1,0 +1,153 @@
+"""Episodes: asking for one, opening it, closing it, and the end of the run.
+
+An episode closes when every trial of it has its outcome or is lost, or by configuration at a
+quorum after a deadline. Outcomes reach the learner in one piece with the next ask, ordered by
+trial number: the journal's order of arrival cannot change what it proposes.
+"""
+
+from __future__ import annotations
+
+import math
+
+from shearline.learner.dispatcher.book import TrialRow
+from shearline.learner.dispatcher.desk import Desk
+from shearline.learner.dispatcher.entries import (
+    EpisodeDone,
+    RunEnded,
+    TrialLost,
+    TrialsProposed,
+)
+from shearline.learner.dispatcher.events import ProposalsReady
+from shearline.learner.dispatcher.instructions import Ask, Broadcast, EndRun
+from shearline.learner.dispatcher.rules import ATTEMPTS_MAX
+from shearline.learner.dispatcher.states import RunCause, RunState, TrialState
+from shearline.protocol.messages import (
+    Command,
+    CommandKind,
+    EpisodeClosed,
+    OutcomeKind,
+)
+
+
+def ask(desk: Desk) -> None:
+    """Ask for the next episode, or end the run if there is none."""
+    episode = len(desk.book.closed)
+    if episode >= desk.rules.episodes:
+        desk.journal(RunEnded(at_s=desk.now_s, stimulus=desk.stimulus, ok=True, why=""))
+        dismiss(desk, ok=True, why="")
+        return
+    desk.asking = episode
+    tells = desk.book.told[-1] if desk.book.told else ()
+    desk.out.append(Ask(episode, desk.rules.trials, tells))
+
+
+def propose(desk: Desk, event: ProposalsReady) -> None:
+    """Open the episode that was asked for; any other answer is ignored."""
+    if event.episode != desk.asking:
+        return
+    desk.asking = None
+    desk.journal(
+        TrialsProposed(
+            at_s=desk.now_s, stimulus=desk.stimulus, episode=event.episode, trials=event.trials
+        )
+    )
+    desk.opened_s = desk.clock_s
+
+
+def settle(desk: Desk) -> None:
+    """Give up trials that used up their attempts, then close the episode if nothing is open."""
+    book = desk.book
+    while book.released:
+        trial = book.trials[book.released.pop()]
+        if trial.state is TrialState.PENDING and _is_exhausted(desk, trial):
+            _lose(desk, trial)
+    if book.episode is not None and (book.unsettled == 0 or _has_quorum(desk)):
+        _close(desk, book.episode)
+
+
+def stop(desk: Desk, why: str) -> None:
+    """Hand out nothing more; what runs may finish within the grace."""
+    if desk.state is RunState.STOPPING:
+        return
+    desk.enter(RunCause.STOP)
+    desk.asking = None
+    desk.stop_why = why or "stopped by the operator"
+    desk.stop_by_s = desk.clock_s + desk.rules.stop_grace_s
+    desk.out.append(Broadcast(Command(kind=CommandKind.STOP, why=desk.stop_why)))
+    desk.say(f"stopping: {desk.stop_why}")
+
+
+def finish_stop(desk: Desk) -> None:
+    """End a stopping run once nothing runs or the grace is over; it can be resumed later."""
+    if not desk.book.live or desk.clock_s >= desk.stop_by_s:
+        dismiss(desk, ok=False, why=desk.stop_why)
+
+
+def dismiss(desk: Desk, *, ok: bool, why: str) -> None:
+    """Let go of everyone; what is on record decides whether the run can be resumed."""
+    desk.enter(RunCause.END)
+    desk.asking = None
+    said = why or "the run is complete"
+    desk.out.append(Broadcast(Command(kind=CommandKind.STOP, why=said)))
+    desk.say(f"ended: {said}")
+    last = desk.book.told[-1] if desk.book.told else ()
+    desk.out.append(EndRun(ok=ok, why=why, tells=(*last, *desk.book.tells())))
+
+
+def _fail(desk: Desk, why: str) -> None:
+    """End the run for good: going on would only repeat it."""
+    desk.journal(RunEnded(at_s=desk.now_s, stimulus=desk.stimulus, ok=False, why=why[:2048]))
+    dismiss(desk, ok=False, why=why[:2048])
+
+
+def _is_exhausted(desk: Desk, trial: TrialRow) -> bool:
+    rules = desk.rules
+    return (
+        trial.losses >= rules.losses_max
+        or trial.aborts >= rules.aborts_max
+        or trial.attempts >= ATTEMPTS_MAX
+    )
+
+
+def _lose(desk: Desk, trial: TrialRow) -> None:
+    why = f"given up after {trial.attempts} attempts; the last: {trial.why}"
+    desk.journal(
+        TrialLost(at_s=desk.now_s, stimulus=desk.stimulus, trial=trial.number, why=why[:2048])
+    )
+    desk.say(f"trial {trial.number} is lost: {why}")
+
+
+def _has_quorum(desk: Desk) -> bool:
+    rules, book = desk.rules, desk.book
+    if rules.quorum >= 1.0 or desk.clock_s - desk.opened_s < rules.quorum_after_s:
+        return False
+    rows = book.rows(len(book.closed))
+    counted = sum(row.result is not None for row in rows)
+    return counted >= max(1, math.ceil(rules.quorum * len(rows)))
+
+
+def _close(desk: Desk, episode: int) -> None:
+    rows = desk.book.rows(episode)
+    summary = summarise(episode, rows, desk.now_s)
+    desk.journal(EpisodeDone(at_s=desk.now_s, stimulus=desk.stimulus, summary=summary))
+    desk.say(f"episode {episode} closed: {summary.successes} of {summary.trials} succeeded")
+    if summary.trials == 0:
+        why = f"no trial of episode {episode} reached a verdict; trial {rows[-1].number} was"
+        _fail(desk, f"{why} {rows[-1].why}: correct the task or its evaluators")
+    elif desk.state is not RunState.STOPPING or len(desk.book.closed) >= desk.rules.episodes:
+        ask(desk)
+
+
+def summarise(episode: int, rows: list[TrialRow], at_s: float) -> EpisodeClosed:
+    """Return what an episode came to, over the trials that have an outcome."""
+    results = [row.result for row in rows if row.result is not None]
+    won = [r.cost for r in results if r.kind is OutcomeKind.SUCCESS]
+    return EpisodeClosed(
+        episode=episode,
+        trials=len(results),
+        successes=len(won),
+        success_rate=len(won) / len(results) if results else 0.0,
+        mean_cost=math.fsum(r.cost for r in results) / len(results) if results else None,
+        best_cost=min(won, default=None),
+        at_s=at_s,
+    )

@@ -1,0 +1,60 @@
+"""What a run is judged by: the numbers the dispatcher keeps to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shearline.protocol.messages import TaskSpec
+
+#: Evaluators known at once; more are refused, so that no table grows without bound.
+EVALUATORS_MAX = 4096
+
+#: Attempts of one trial, whatever became of them; far above what the other bounds allow, and
+#: there for evaluators that join and leave for ever.
+ATTEMPTS_MAX = 64
+
+#: Leases an attempt is given when the learner itself was away: its evaluators must first find
+#: the way back (measured: reconnected within .4 s of the endpoint's return).
+REJOIN_LEASES = 2.0
+
+#: An evaluator unheard for so many leases is handed nothing; idle ones are heard twice a lease.
+SILENCE_LEASES = 1.5
+
+#: Longest rest of an evaluator whose attempts keep lapsing [s].
+REST_S_MAX = 60.0
+
+#: A copy is worth handing out once an attempt is so many times older than the median.
+SPECULATE_FACTOR = 2.0
+
+#: Turnarounds the median is taken over, and how many it needs to mean anything.
+TURNAROUNDS_MAX = 101
+TURNAROUNDS_MIN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """Everything about a run that decides who gets what and when something counts as lost.
+
+    Attributes:
+        task: What is being learned; ``task.trial_s`` bounds one trial [s].
+        episodes: Episodes of the run.
+        trials: Trials of each episode.
+        lease_s: An attempt not renewed for so long is given out again [s].
+        speculative: Hand out one copy of a slow attempt when nothing is pending.
+        quorum: Share of an episode's trials, (0, 1], that may close it after ``quorum_after_s``.
+        quorum_after_s: How long an episode must have been open for that [s].
+        losses_max: A trial whose attempts lapsed so often is lost.
+        aborts_max: A trial aborted or rejected so often is lost.
+        stop_grace_s: How long a stop waits for what runs [s].
+    """
+
+    task: TaskSpec
+    episodes: int
+    trials: int
+    lease_s: float = 2.0
+    speculative: bool = True
+    quorum: float = 1.0
+    quorum_after_s: float = 60.0
+    losses_max: int = 3
+    aborts_max: int = 3
+    stop_grace_s: float = 5.0

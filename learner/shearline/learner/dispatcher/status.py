@@ -1,0 +1,49 @@
+"""The run at a glance, as a value."""
+
+from __future__ import annotations
+
+from shearline.learner.dispatcher.core import Dispatcher
+from shearline.learner.dispatcher.states import TrialState
+from shearline.protocol.messages import Status
+
+
+def status(
+    dispatcher: Dispatcher, *, run: str, learner: str, rate_hz: float, step_ms_max: float
+) -> Status:
+    """Return where the run stands.
+
+    Args:
+        dispatcher: Whose run it is.
+        run: The run's name.
+        learner: The learner's name.
+        rate_hz: Trials counted per second of late [1/s].
+        step_ms_max: Longest step of the owner thread so far [ms].
+    """
+    desk, book = dispatcher.desk, dispatcher.book
+    rows = book.rows(len(book.episodes) - 1) if book.episodes else []
+    states = [row.state for row in rows]
+    pending, leased = states.count(TrialState.PENDING), states.count(TrialState.LEASED)
+    return Status(
+        run=run,
+        task=desk.rules.task.name,
+        learner=learner,
+        epoch=book.epoch,
+        state=desk.state,
+        episode=max(len(book.episodes) - 1, 0),
+        episodes=desk.rules.episodes,
+        trials_per_episode=desk.rules.trials,
+        pending=pending,
+        leased=leased,
+        done=len(states) - pending - leased,
+        counted=book.tally.counted,
+        lost=book.tally.lost,
+        late=book.tally.late,
+        duplicates=book.tally.surplus + desk.resends,
+        aborted=book.tally.aborted,
+        rejected=book.tally.rejected,
+        rate_hz=rate_hz,
+        step_ms_max=step_ms_max,
+        evaluators=[desk.describe(evaluator) for evaluator in desk.roster],
+        history=book.closed,
+        at_s=desk.now_s,
+    )
