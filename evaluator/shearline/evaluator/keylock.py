@@ -1,0 +1,166 @@
+"""The key-in-lock task: noise by seed, one trial on the plant, cost and verdict.
+
+Constructing it costs nothing; engine and compiler are loaded by :meth:`KeylockTask.warm`, or by
+whatever needs them first. Knows no learner and no wire.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shearline.evaluator.keylock_spec import (
+    COST_PER_M,
+    ROI_M,
+    SKILL_VERSION,
+    TRIAL_S,
+    Level,
+    keylock_spec,
+    level,
+)
+from shearline.evaluator.skill.parameters import parameters
+from shearline.evaluator.task import Array, Outcome, TrialAborted
+from shearline.protocol.messages import TaskSpec
+
+if TYPE_CHECKING:
+    from shearline.evaluator.skill.execute import Job
+    from shearline.evaluator.skill.semantic import Limits
+    from shearline.sims.mujoco_plant import MujocoPlant
+    from shearline.sims.plant import Setup
+    from shearline.sims.scene import Scene
+
+#: A tuple that runs through every phase; the first trial of a process warms caches with it.
+_WARM_SEED = 0
+
+
+class KeylockTask:
+    """Insert a key into a lock that is not quite where it is believed to be.
+
+    Args:
+        name: Level: ``"keylock"``, ``"keylock-limit"`` or ``"keylock-jam"``.
+        scene: Scene to simulate; the default is the one all figures are measured with.
+        extract: Whether each trial pulls the key out again after the verdict. Costs time and
+            decides nothing in simulation, where each trial starts from a reset.
+
+    Raises:
+        ConfigError: If there is no such level.
+    """
+
+    def __init__(
+        self, name: str = "keylock", *, scene: Scene | None = None, extract: bool = False
+    ) -> None:
+        self._spec = keylock_spec(name)
+        self._level = level(name)
+        self._scene = scene
+        self._extract = extract
+        self._plant: MujocoPlant | None = None
+        self._rows: Array | None = None
+
+    @property
+    def spec(self) -> TaskSpec:
+        """Name, space and options."""
+        return self._spec
+
+    @property
+    def engine(self) -> str:
+        """Engine, version, model hash and version of the skill; loads the engine."""
+        return f"{self.plant.engine} skill {SKILL_VERSION}"
+
+    @property
+    def plant(self) -> MujocoPlant:
+        """The simulation, built on first use."""
+        if self._plant is None:
+            from shearline.sims.mujoco_plant import MujocoPlant  # noqa: PLC0415 - see module
+
+            self._plant = MujocoPlant(self._scene)
+        return self._plant
+
+    def warm(self) -> None:
+        """Load the engine, load or compile the loop, and run one trial."""
+        space = (self._spec.space[name] for name in self._spec.space)
+        centre = np.array([(low + high) / 2.0 for _, low, high in space])
+        self.run(centre, _WARM_SEED, lambda: None)
+
+    def run(self, theta: Array, seed: int, beat: Callable[[], None]) -> Outcome:
+        """Run one trial; see :class:`shearline.evaluator.task.Task`.
+
+        Extras: ``depth_m`` and ``insertion_s`` (time since the mouth plane), ``trial_s`` (whole
+        trial in its own time), ``offset_m`` and ``tilt_rad`` (how far off the lock really was).
+
+        Raises:
+            TrialAborted: If the simulation broke down before a verdict.
+        """
+        from shearline.evaluator.skill import execute, semantic, trace  # noqa: PLC0415
+        from shearline.sims.plant import PlantError  # noqa: PLC0415
+        from shearline.sims.scene import TICK_S  # noqa: PLC0415
+
+        setup, off = draw_setup(self._level, seed)
+        if self._rows is None:
+            self._rows = np.empty((execute.TICKS_MAX, len(trace.COLUMNS)))
+        job = self.job(theta)
+        try:
+            end, rows = execute.execute_compiled(self.plant, setup, job, beat, self._rows)
+        except PlantError as error:
+            raise TrialAborted(str(error)) from error
+        return Outcome(
+            cost=semantic.cost(end, job.limits, TICK_S),
+            success=end.verdict == semantic.SUCCESS,
+            digest=trace.digest(rows),
+            extras={
+                "depth_m": float(end.depth_m),
+                "insertion_s": end.clock_ticks * TICK_S,
+                "trial_s": len(rows) * TICK_S,
+                "offset_m": float(np.linalg.norm(off[:3])),
+                "tilt_rad": float(np.linalg.norm(off[3:])),
+            },
+            why=semantic.VERDICTS[end.verdict],
+            trace=trace.trace(rows, end, TICK_S),
+        )
+
+    def job(self, theta: Array) -> Job:
+        """Return what a trial of ``theta (23,)`` is to do."""
+        from shearline.evaluator.skill.control import arm  # noqa: PLC0415
+        from shearline.evaluator.skill.execute import Job  # noqa: PLC0415
+        from shearline.sims.scene import TICK_S, believed_lock_pose  # noqa: PLC0415
+
+        return Job(
+            p=parameters(theta),
+            limits=self.limits(),
+            arm=arm(believed_lock_pose(), TICK_S),
+            extract=self._extract,
+        )
+
+    def limits(self) -> Limits:
+        """Return what a trial of this level must not exceed."""
+        from shearline.evaluator.skill.semantic import Limits  # noqa: PLC0415
+
+        big, small = self._level.torque_big, self._level.torque_small
+        return Limits(
+            torque=np.array([big] * 4 + [small] * 3),
+            roi_m=ROI_M,
+            depth_m=self.plant.scene.lock.depth_m,
+            cost_per_m=COST_PER_M,
+        )
+
+
+def draw_setup(chosen: Level, seed: int) -> tuple[Setup, Array]:
+    """Draw what differs in the trial with this seed.
+
+    Returns:
+        The setup, and the lock's true pose off the believed one ``(6,)`` [m, rad].
+    """
+    from shearline.sims.lock import PINS  # noqa: PLC0415
+    from shearline.sims.plant import Setup  # noqa: PLC0415
+    from shearline.sims.scene import believed_lock_pose  # noqa: PLC0415
+
+    rng = np.random.default_rng(seed)
+    off = np.clip(rng.standard_normal(6), -2.0, 2.0)
+    off[:3] *= chosen.offset_m
+    off[3:] *= chosen.tilt_rad
+    friction = None if chosen.friction is None else float(rng.uniform(*chosen.friction))
+    spread = chosen.pin_spread
+    scale = tuple(float(f) for f in rng.uniform(1.0 - spread, 1.0 + spread, PINS))
+    pose = believed_lock_pose().moved(off[:3], off[3:])
+    return Setup(lock=pose, friction=friction, pin_scale=scale), off
