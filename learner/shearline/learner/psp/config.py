@@ -79,6 +79,9 @@ class PSPConfig:
         spread: Factor on the components' standard deviations when drawing.
         labels: Mean reward the samples are labelled against.
         reward: Map from cost to reward.
+        neighbours: Trials around a success that say how reliable it is: its reward becomes the
+            one to be expected if it were repeated, failures counting -1. 0 takes every success
+            at its word, as the paper does.
         svm_c: C, the price of a sample on the wrong side.
         balanced: Whether C is weighted inversely to the size of the two classes.
         gammas: Kernel widths tried, as multiples of 12 / n: the value at which two uniformly
@@ -86,7 +89,8 @@ class PSPConfig:
         distance: Distance whose minimum over the samples chooses gamma.
         outside: What happens to draws outside the cube.
         exhausted: What is applied after ``redraws_max`` rejections.
-        fit_samples_max: Most samples a model is fitted to; bounds the time of an update.
+        fit_samples_max: Latest trials that an update looks at; bounds its time. A run of the
+            paper has 200 to 400.
     """
 
     proposal_min: int = 5
@@ -99,6 +103,7 @@ class PSPConfig:
     spread: float = 1.0
     labels: Labels = Labels.NEW
     reward: RewardMap = RewardMap.LINEAR
+    neighbours: int = 12
     svm_c: float = 1e3
     balanced: bool = False
     gammas: tuple[float, ...] = (1.0,)
@@ -114,6 +119,7 @@ class PSPConfig:
         _check(self.redraws_max >= 1, "redraws_max", "1 or more", self.redraws_max)
         _check(self.covariance_floor > 0, "covariance_floor", "above 0", self.covariance_floor)
         _check(self.spread > 0, "spread", "above 0", self.spread)
+        _check(self.neighbours >= 0, "neighbours", "0 or more", self.neighbours)
         _check(self.svm_c > 0, "svm_c", "above 0", self.svm_c)
         gammas_ok = len(self.gammas) > 0 and all(g > 0 for g in self.gammas)
         _check(gammas_ok, "gammas", "one or more factors above 0", self.gammas)
@@ -123,12 +129,13 @@ class PSPConfig:
     def paper(cls) -> Self:
         """Return the literal reading of section 3.
 
-        Where the paper gives no number, the value is ours: C and the grid of gammas as narrow
-        as LEARNING needs to draw proposals at all (see docs/learners.md).
+        Where the paper gives no number, the value is ours: C and the grid of gammas as wide
+        as proposals can still pass the filter (see docs/learners.md).
         """
         return cls(
             mixture_data=MixtureData.SUCCESSES,
             covariance=Covariance.FULL,
+            neighbours=0,
             svm_c=1e4,
             gammas=(0.1, 0.18, 0.32, 0.56, 1.0, 1.8, 3.2, 5.6, 10.0),
             distance=Distance.FUNCTIONAL,

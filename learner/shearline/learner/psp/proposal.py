@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from shearline.learner.base import Array
 from shearline.learner.psp.config import Covariance, Outside, PSPConfig
@@ -45,6 +46,23 @@ class Mixture:
         """Standard deviations along the axes ``(k, n)``."""
         lengths: Array = np.sqrt(np.sum(self.factors**2, axis=2))
         return lengths
+
+    @property
+    def spread(self) -> Array:
+        """Root mean square over the components of the standard deviations ``(n,)``."""
+        mean_square: Array = self.weights @ self.deviations**2
+        return np.sqrt(mean_square)
+
+    def nearest(self, u: Array) -> npt.NDArray[np.int64]:
+        """Return for tuples ``(m, n)`` the component ``(m,)`` most likely to have made each.
+
+        Components are taken as axis-parallel here: this is for telling them apart, not for
+        densities.
+        """
+        offset = (u[:, None, :] - self.means) / self.deviations
+        log_density = -0.5 * np.sum(offset**2, axis=2) - np.sum(np.log(self.deviations), axis=1)
+        best: npt.NDArray[np.int64] = np.argmax(log_density + np.log(self.weights), axis=1)
+        return best
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """Return ``(count, n)`` draws, not confined to the cube."""

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict
 
 import numpy as np
-import numpy.typing as npt
 
 from shearline.learner.base import Array
 from shearline.learner.episodic import EpisodicLearner
 from shearline.learner.ledger import Trials
 from shearline.learner.lhs import latin_hypercube
-from shearline.learner.psp.config import Exhausted, MixtureData, PSPConfig
-from shearline.learner.psp.partition import Partition, fit_partition
-from shearline.learner.psp.proposal import Mixture, draw_inside, fit_mixture
-from shearline.learner.psp.reward import UNBOUNDED, rewards, update
+from shearline.learner.psp.config import Exhausted, PSPConfig
+from shearline.learner.psp.model import Model, renew
+from shearline.learner.psp.partition import Partition
+from shearline.learner.psp.proposal import draw_inside
+from shearline.learner.psp.reward import rewards
 from shearline.learner.recommend import Focus
-from shearline.learner.threads import fitting
 from shearline.protocol.space import Space
 
 #: Proposals judged at a time; the first accepted one of a block is applied.
@@ -42,50 +42,33 @@ class PSP(EpisodicLearner):
         self.config = config
         self.name = name
         self._design: Array | None = None
-        self._threshold_cost = UNBOUNDED
-        self._components: int | None = None
-        self._mixture: Mixture | None = None
-        self._partition: Partition | None = None
-        self._trials: Trials = self._ledger.trials()
-        self._good: npt.NDArray[np.bool_] = np.zeros(0, dtype=np.bool_)
+        self._belief = Model(self._ledger.trials(), np.zeros(0, dtype=np.bool_))
 
     def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
-        self._design = None
         if episode == 0:
             self._design = latin_hypercube(rng, self.episode_length, len(self.space))
             return
-        self._trials = trials
-        self._good, self._threshold_cost = update(
-            trials, self._threshold_cost, self.config.labels, self.config.reward
-        )
-        wins = int(trials.success.sum())
-        with fitting():
-            if wins >= self.config.proposal_min:
-                self._fit_mixture(rng)
-            if wins >= self.config.filter_min:
-                chosen = working_set(trials, self._good, self.config.fit_samples_max)
-                self._partition = fit_partition(trials.u[chosen], self._good[chosen], self.config)
+        self._design = None
+        self._belief = self._renewed(trials)
 
-    def _fit_mixture(self, rng: np.random.Generator) -> None:
-        chosen = mixture_samples(self._trials, self._good, self.config)
-        seed = int(rng.integers(2**31))
-        self._mixture, self._components = fit_mixture(chosen, self._components, seed, self.config)
+    def _renewed(self, trials: Trials) -> Model:
+        return renew(self._belief, trials, self.seed % 2**32, self.config)
 
     def _draw(self, index: int, rng: np.random.Generator) -> Array:
         if self._design is not None:
             return np.array(self._design[index])
-        if self._partition is None:
+        if self._belief.partition is None:
             return np.array(self._propose(1, rng)[0])
-        return self._filtered(self._partition, rng)
+        return self._filtered(self._belief.partition, rng)
 
     def _propose(self, count: int, rng: np.random.Generator) -> Array:
-        if self._mixture is None:
+        if self._belief.mixture is None:
             return rng.random((count, len(self.space)))
-        return draw_inside(self._mixture, rng, count, self.config.outside)
+        return draw_inside(self._belief.mixture, rng, count, self.config.outside)
 
     def _filtered(self, partition: Partition, rng: np.random.Generator) -> Array:
         """Return the first accepted proposal, or after ``redraws_max`` what ``exhausted`` says."""
-        best, best_value = np.empty(0), -np.inf
+        best, best_value = np.empty(0), -math.inf
         for start in range(0, self.config.redraws_max, BLOCK):
             block = self._propose(min(BLOCK, self.config.redraws_max - start), rng)
             values = partition.decision(block)
@@ -98,65 +81,53 @@ class PSP(EpisodicLearner):
         return np.array(best)
 
     def _focus(self, trials: Trials) -> Focus:
-        return super()._focus(trials)
+        """Return the component of the mixture, as the next episode would have it, that pays best.
+
+        That is the one whose good samples have the least expected cost.
+        """
+        model = self._renewed(trials)
+        if model.mixture is None or not model.good.any():
+            return super()._focus(trials)
+        good = model.trials.where(model.good)
+        component = model.mixture.nearest(good.u)
+        counts = np.bincount(component, minlength=len(model.mixture.weights))
+        sums = np.bincount(component, weights=good.cost, minlength=len(counts))
+        costs = np.where(counts > 0, sums / np.maximum(counts, 1), math.inf)
+        best = int(np.argmin(costs))
+        return Focus(model.mixture.means[best], model.mixture.deviations[best])
 
     def _model(self) -> Mapping[str, object]:
-        proposal = "mixture" if self._mixture else "uniform"
+        belief = self._belief
+        worth = rewards(belief.trials, self.config.reward)
+        proposal = "mixture" if belief.mixture else "uniform"
         return {
             "config": {name: _plain(value) for name, value in asdict(self.config).items()},
             "proposal": "lhs" if self._design is not None else proposal,
-            "threshold_cost": None if self._threshold_cost == UNBOUNDED else self._threshold_cost,
-            "mean_reward": self._mean_reward(),
-            "mixture": None if self._mixture is None else dict(self._mixture.snapshot()),
-            "partition": None if self._partition is None else dict(self._partition.snapshot()),
+            "threshold_cost": _finite(belief.threshold_cost),
+            "mean_reward": float(worth[belief.good].mean()) if belief.good.any() else 0.0,
+            "mixture": None if belief.mixture is None else dict(belief.mixture.snapshot()),
+            "partition": None if belief.partition is None else dict(belief.partition.snapshot()),
             "samples": {
-                "trial": self._trials.number.tolist(),
-                "u": self._trials.u.tolist(),
-                "reward": rewards(self._trials, self.config.reward).tolist(),
-                "good": self._good.tolist(),
+                "trial": belief.trials.number.tolist(),
+                "u": belief.trials.u.tolist(),
+                "cost": belief.trials.cost.tolist(),
+                "reward": worth.tolist(),
+                "good": belief.good.tolist(),
             },
         }
 
-    def _mean_reward(self) -> float:
-        """Return rbar: the mean reward of the good samples under the present map, 0 at first."""
-        if not self._good.any():
-            return 0.0
-        return float(rewards(self._trials, self.config.reward)[self._good].mean())
-
 
 def _plain(value: object) -> object:
-    return list(value) if isinstance(value, tuple) else value
+    match value:
+        case tuple():
+            return list(value)
+        case str():
+            return str(value)
+    return value
 
 
-def mixture_samples(trials: Trials, good: npt.NDArray[np.bool_], config: PSPConfig) -> Array:
-    """Return the samples ``(k, n)`` the mixture is fitted to, at most ``fit_samples_max``.
-
-    With ``positives``, the cheapest successes fill up to ``proposal_min`` where fewer are
-    positive: a component needs something to be wide on.
-    """
-    won = trials.where(trials.success)
-    if config.mixture_data is MixtureData.SUCCESSES:
-        return won.u[-config.fit_samples_max :]
-    count = min(max(int(good.sum()), config.proposal_min), config.fit_samples_max)
-    # Good samples are the cheapest successes by definition; ties go to the earlier trial.
-    return won.u[np.argsort(won.cost, kind="stable")[:count]]
-
-
-def working_set(
-    trials: Trials, good: npt.NDArray[np.bool_], samples_max: int
-) -> npt.NDArray[np.int64]:
-    """Return the indices ``(k,)`` of the samples the filter is fitted to, in order.
-
-    All of them up to ``samples_max``; beyond, the cheapest positives up to half of that and the
-    latest negatives, which lie where proposals are drawn now.
-    """
-    if len(trials) <= samples_max:
-        return np.arange(len(trials))
-    plus, minus = np.flatnonzero(good), np.flatnonzero(~good)
-    room = max(samples_max // 2, samples_max - len(minus))
-    plus = plus[np.argsort(trials.cost[plus], kind="stable")[:room]]
-    minus = minus[-(samples_max - len(plus)) :]
-    return np.sort(np.concatenate([plus, minus]))
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def working(space: Space, episode_length: int = 20, seed: int = 0, **switches: object) -> PSP:
