@@ -21,6 +21,8 @@ from shearline.protocol.messages import (
     TraceData,
     Wire,
 )
+from shearline.record.head import config_of
+from shearline.record.writer import RecordWriter
 
 SPACE = {
     "ins_push": ("N", 0.0, 20.0),
@@ -174,8 +176,6 @@ def run_dir(tmp_path: Path) -> Path:
 @pytest.fixture
 def write_run(run_dir: Path) -> Callable[..., Path]:
     """Write a whole synthetic run into the run folder, as the recorder would."""
-    from shearline.record.recorder import config_of
-    from shearline.record.writer import RecordWriter
 
     def write(**shape: int) -> Path:
         now_ns = time.time_ns()

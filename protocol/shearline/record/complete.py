@@ -12,8 +12,9 @@ from pathlib import Path
 
 from shearline.protocol.messages import Counted, EpisodeClosed
 from shearline.record.foxglove import Level
+from shearline.record.head import config_of
 from shearline.record.reader import open_run
-from shearline.record.recorder import config_of, seal_all
+from shearline.record.seal import seal_all
 from shearline.record.writer import RecordWriter
 
 

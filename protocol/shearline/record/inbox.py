@@ -12,7 +12,7 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from shearline.protocol.link import Arrival
+from shearline.protocol.link import Arrival, Presence
 
 #: Some seconds of ten simulators at full rate; the recorder's memory stays near this.
 BULK_BYTES_MAX = 64 * 2**20
@@ -58,10 +58,16 @@ class Inbox:
     ) -> None:
         self._bulk = _Lane(bulk_bytes_max)
         self._small = _Lane(small_bytes_max)
+        self._learners: set[str] = set()
         self._ready = threading.Condition()
 
-    def put(self, arrival: Arrival) -> None:
+    def put(self, arrival: Arrival | Presence) -> None:
         """Take one arrival; called from the network's threads, never waits for the disk."""
+        if isinstance(arrival, Presence):
+            with self._ready:
+                change = self._learners.add if arrival.alive else self._learners.discard
+                change(arrival.key)
+            return
         item = Item(arrival.key, arrival.payload, time.time_ns())
         with self._ready:
             (self._bulk if _is_trace(item.key) else self._small).add(item)
@@ -72,6 +78,11 @@ class Inbox:
         with self._ready:
             self._ready.wait_for(self._any, timeout_s)
             return self._small.take() or self._bulk.take()
+
+    def any_learner(self) -> bool:
+        """Tell whether a learner of the run is alive, as far as its tokens say."""
+        with self._ready:
+            return bool(self._learners)
 
     def take_dropped(self) -> tuple[Dropped, Dropped]:
         """Return what was dropped of traces and of all else since the last call."""

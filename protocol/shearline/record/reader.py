@@ -126,7 +126,7 @@ class Run:
         Raises:
             RecordError: If a part can no longer be read where the trace was found.
         """
-        return [_to_trace(_fetch(place)) for place in self._traced.get(trial, [])]
+        return [to_trace(_fetch(place)) for place in self._traced.get(trial, [])]
 
     def messages(self, topic: str) -> Iterator[tuple[int, Message]]:
         """Yield ``(log time in ns, message)`` of one topic, part after part.
@@ -264,7 +264,12 @@ def _fetch(place: _Place) -> TraceData:
     raise RecordError(f"{place.path.name} has changed while it was read: open the run again")
 
 
-def _to_trace(trace: TraceData) -> Trace:
+def to_trace(trace: TraceData) -> Trace:
+    """Give the columns of a trace their shape and names.
+
+    Raises:
+        RecordError: If its bytes do not fit its columns.
+    """
     shape = (len(trace.names), trace.samples)
     try:
         values = np.frombuffer(trace.data, dtype="<f4").reshape(shape)

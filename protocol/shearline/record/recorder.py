@@ -17,7 +17,6 @@ import subprocess
 import sys
 import threading
 import time
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from queue import SimpleQueue
@@ -29,14 +28,15 @@ from shearline.protocol.keys import Keys
 from shearline.protocol.link import open_client
 from shearline.protocol.messages import Message, Status
 from shearline.record.foxglove import Level
+from shearline.record.head import config_of
 from shearline.record.inbox import Dropped, Inbox
-from shearline.record.parts import parts
-from shearline.record.seal import seal
-from shearline.record.topics import RunConfig
+from shearline.record.seal import seal_all
 from shearline.record.writer import RecordWriter
 
 #: A learner speaks twice a second; this long without a word it is gone for good.
 SILENCE_S = 30.0
+#: Once its liveliness token is gone, the next life of the learner brings its own recorder.
+GONE_S = 5.0
 #: After the run's end, traces may still be on their way from evaluators: wait until all is quiet.
 QUIET_S = 0.5
 #: ... but not for ever.
@@ -72,31 +72,12 @@ def record_run(
     inbox = Inbox()
     with open_client(connect, silence_s, cancelled=stopped) as link:
         # an Inbox is put into exactly as a queue is, and bounds what a queue would not
-        link.subscribe(Keys(run).observed(), cast("SimpleQueue[Any]", inbox))
+        queue = cast("SimpleQueue[Any]", inbox)
+        link.subscribe(Keys(run).observed(), queue)
+        link.watch(Keys(run).live_learners(), queue)
         with RecordWriter(run_dir, config_of(run, run_dir)) as writer:
             ready()
             _Recorder(inbox, writer, silence_s, stopped).work()
-
-
-def seal_all(run_dir: Path) -> int:
-    """Seal every torn part of a run folder; return how many there were."""
-    return sum(seal(path) for path in parts(run_dir))
-
-
-def config_of(run: str, run_dir: Path) -> RunConfig:
-    """Return the head of a record from the run folder's ``run.toml``, empty where there is none."""
-    path = run_dir / "run.toml"
-    text = path.read_text(encoding="utf-8") if path.is_file() else ""
-    space = _space(text)
-    return RunConfig(
-        run=run,
-        text=text,
-        names=list(space),
-        units=[unit for unit, _, _ in space.values()],
-        low=[low for _, low, _ in space.values()],
-        high=[high for _, _, high in space.values()],
-        at_s=time.time(),
-    )
 
 
 def spawn(connect: str, run: str, run_dir: Path) -> subprocess.Popen[str]:
@@ -130,6 +111,7 @@ class _Recorder:
         self._stopped = stopped
         self._heard_s = time.monotonic()
         self._ended_s: float | None = None
+        self._alive_s: float | None = None
         self._refused = 0
 
     def work(self) -> None:
@@ -163,6 +145,10 @@ class _Recorder:
             return "told to stop"
         if self._ended_s is not None and (quiet_s > QUIET_S or now_s - self._ended_s > GRACE_S):
             return "the run has ended"
+        if self._inbox.any_learner():
+            self._alive_s = now_s
+        elif self._alive_s is not None and now_s - self._alive_s > GONE_S and quiet_s > GONE_S:
+            return "the learner is gone"
         if quiet_s > self._silence_s:
             return f"no word from the learner for {self._silence_s:g} s"
         return None
@@ -216,12 +202,6 @@ def _drop_sentence(dropped: Dropped, what: str) -> str:
         f"dropped the oldest {dropped.count} {what} ({dropped.total_bytes / 1e6:.1f} MB):"
         " the disk is slower than the run"
     )
-
-
-def _space(text: str) -> dict[str, tuple[str, float, float]]:
-    task = tomllib.loads(text).get("task", {}) if text else {}
-    space = task.get("space", {}) if isinstance(task, dict) else {}
-    return {name: (str(unit), float(low), float(high)) for name, (unit, low, high) in space.items()}
 
 
 if __name__ == "__main__":

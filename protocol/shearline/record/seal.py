@@ -31,6 +31,7 @@ from mcap.records import (
 
 from shearline.protocol.errors import RecordError
 from shearline.record.frames import MAGIC, Frame, chunk_of, frames, records_of
+from shearline.record.parts import parts
 
 _FOOTER = struct.Struct("<BQQQ")
 
@@ -61,6 +62,11 @@ def seal(path: Path) -> bool:
         file.flush()
         os.fsync(file.fileno())
     return True
+
+
+def seal_all(run_dir: Path) -> int:
+    """Seal every torn part of a run folder; return how many there were."""
+    return sum(seal(path) for path in parts(run_dir))
 
 
 @dataclass(slots=True)

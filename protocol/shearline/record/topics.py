@@ -63,8 +63,7 @@ TOPICS: dict[type[Message], Topic] = {
         (
             messages.TraceData,
             "/trial/trace",
-            "one message per traced attempt: data holds samples * len(names) values, column"
-            + " after column; the first column t_s is the trial's clock in s; units as listed",
+            "one per traced attempt; data is column after column; t_s is the trial's clock in s",
         ),
         (messages.EvaluatorState, "/evaluator/state", "where one evaluator stands, at each change"),
         (messages.Snapshot, "/learner/model", "the learner's model after an episode, JSON text"),

@@ -1,0 +1,178 @@
+"""Shows a run in Rerun: from its folder, into a file, or live while it is learned.
+
+Whatever happens to the viewer, nobody in the run waits for it: a live view is one more observer
+with a bounded inbox. What is drawn, and where, is said elsewhere.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any, cast
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from shearline.protocol import codec
+from shearline.protocol.errors import ProtocolError
+from shearline.protocol.keys import Keys
+from shearline.protocol.link import discover, free_endpoint, open_client
+from shearline.protocol.messages import (
+    Counted,
+    EpisodeClosed,
+    EvaluatorState,
+    Message,
+    Status,
+    TraceData,
+)
+from shearline.record import columns
+from shearline.record.inbox import Inbox
+from shearline.record.layout import layout
+from shearline.record.picture import Picture
+from shearline.record.reader import Run, open_run, to_trace
+from shearline.record.viewer import viewer
+
+APPLICATION = "shearline"
+#: Traces kept waiting for a slow viewer; older ones are left out of a live view.
+LIVE_BULK_BYTES = 16 * 2**20
+TICK_S = 0.1
+
+
+def save(run_dir: Path | str, path: Path | str) -> Run:
+    """Write the view of a run into a Rerun file, for machines without a screen.
+
+    Args:
+        run_dir: The run folder.
+        path: File to write, ending in ``.rrd``.
+
+    Returns:
+        The run that was drawn; its ``damage`` says what could not be read.
+
+    Raises:
+        RecordError: If there is no such run folder, or a trace cannot be read.
+    """
+    run = open_run(run_dir)
+    stream = rr.RecordingStream(APPLICATION, recording_id=f"{run.name or run.run_dir.name}")
+    stream.save(path, default_blueprint=_layout_of(run))
+    draw(stream, run)
+    stream.flush()
+    stream.disconnect()
+    return run
+
+
+def view(run_dir: Path | str) -> Run:
+    """Show a run in the viewer; returns when the viewer is closed.
+
+    Raises:
+        RecordError: If there is no such run folder, no viewer, or no screen.
+    """
+    with tempfile.TemporaryDirectory(prefix="shearline-view-") as folder:
+        path = Path(folder) / "run.rrd"
+        run = save(run_dir, path)
+        with viewer([str(path)]) as child:
+            child.wait()
+    return run
+
+
+def draw(stream: rr.RecordingStream, run: Run) -> None:
+    """Draw everything a run has on record."""
+    picture = Picture(stream, run.config)
+    closed = {episode.episode: episode for episode in run.episodes}
+    for outcome in run.outcomes:
+        picture.outcome(outcome)
+    last_trial = {outcome.episode: outcome.trial for outcome in run.outcomes}
+    for number, episode in closed.items():
+        picture.episode(episode, last_trial.get(number))
+    for state in run.evaluators:
+        picture.evaluator(state)
+    for trial in run.traced():
+        for trace in run.traces(trial):
+            picture.trace(trace)
+
+
+def follow(
+    connect: str,
+    stream: rr.RecordingStream,
+    *,
+    closed: Callable[[], bool],
+    timeout_s: float = 5.0,
+) -> None:
+    """Draw a running run into a stream until it ends or ``closed`` says so.
+
+    Args:
+        connect: The learner's endpoint.
+        stream: Where to draw.
+        closed: Asked ten times a second.
+        timeout_s: How long to look for a learner [s].
+
+    Raises:
+        LinkError: If no learner is alive at ``connect``.
+    """
+    inbox = Inbox(bulk_bytes_max=LIVE_BULK_BYTES)
+    with open_client(connect, timeout_s) as link:
+        run, _ = discover(link, timeout_s)
+        link.subscribe(Keys(run).observed(), cast("SimpleQueue[Any]", inbox))
+        live = _Live(stream)
+        while not closed() and not live.ended:
+            item = inbox.get(TICK_S)
+            if item is not None:
+                live.take(item.payload)
+
+
+def view_live(connect: str) -> None:
+    """Show a running run in the viewer, from now on; returns when either has ended.
+
+    Raises:
+        LinkError: If no learner is alive at ``connect``.
+        RecordError: If there is no viewer or no screen.
+    """
+    port = int(free_endpoint().rsplit(":", 1)[1])
+    stream = rr.RecordingStream(APPLICATION)
+    with viewer(["--port", str(port)]) as child:
+        stream.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy")
+        follow(connect, stream, closed=lambda: child.poll() is not None)
+        child.wait()
+
+
+class _Live:
+    """Draws messages as they come; what it cannot read it leaves out."""
+
+    def __init__(self, stream: rr.RecordingStream) -> None:
+        self.ended = False
+        self._stream = stream
+        self._picture = Picture(stream, None)
+        self._groups: list[str] | None = None
+        self._stream.send_blueprint(layout(None, [], tip=None))
+
+    def take(self, payload: bytes) -> None:
+        try:
+            message: Message = codec.decode(payload, *codec.TO_OBSERVER)
+        except ProtocolError:
+            return
+        match message:
+            case Counted():
+                self._picture.outcome(message)
+            case EpisodeClosed():
+                self._picture.episode(message)
+            case EvaluatorState():
+                self._picture.evaluator(message)
+            case TraceData():
+                self._trace(message)
+            case Status(state="ended"):
+                self.ended = True
+
+    def _trace(self, message: TraceData) -> None:
+        trace = to_trace(message)
+        if self._groups is None:
+            self._groups = [group.name for group in columns.groups(trace)]
+            self._stream.send_blueprint(layout(None, self._groups, tip=columns.tip(trace)))
+        self._picture.trace(trace)
+
+
+def _layout_of(run: Run) -> rrb.Blueprint:
+    traced = run.traced()
+    first = run.traces(traced[0])[0] if traced else None
+    groups = [group.name for group in columns.groups(first)] if first else []
+    return layout(run.config, groups, tip=columns.tip(first) if first else None)
