@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from shearline.learner.base import Array, Learner
+from shearline.learner.base import Array, Learner, Proposal
 from shearline.learner.registry import create
 from shearline.protocol.space import Space
 
@@ -51,8 +51,9 @@ def _row(name: str, trials: int, flipped: float) -> dict[str, float | int | str]
     # One long episode, so that all trials are drawn before the update that is measured.
     learner = create(name, Space.unit(PARAMETERS), trials, seed=1)
     rng = np.random.default_rng([trials, int(100 * flipped)])
+    proposals = learner.ask(trials)
     began = time.perf_counter()
-    _tell(learner, trials, flipped, rng)
+    _tell(learner, proposals, flipped, rng)
     told = time.perf_counter()
     learner.ask(PROPOSALS)
     asked = time.perf_counter()
@@ -67,9 +68,11 @@ def _row(name: str, trials: int, flipped: float) -> dict[str, float | int | str]
     }
 
 
-def _tell(learner: Learner, trials: int, flipped: float, rng: np.random.Generator) -> None:
+def _tell(
+    learner: Learner, proposals: list[Proposal], flipped: float, rng: np.random.Generator
+) -> None:
     """Let about half of the trials succeed: a ball in the first six parameters."""
-    for proposal in learner.ask(trials):
+    for proposal in proposals:
         distance = _distance(proposal.theta)
         success = (distance < 0.7) != (rng.random() < flipped)
         cost = 0.3 + distance if success else 14.8

@@ -33,9 +33,7 @@ def positives(trials: Trials, threshold_cost: float) -> npt.NDArray[np.bool_]:
 
     Equality counts so that a single good sample, which is its own mean, stays good.
     """
-    # The mean of equal costs can fall below each of them by a rounding error.
-    slack = 1e-12 * abs(threshold_cost) if math.isfinite(threshold_cost) else 0.0
-    return trials.success & (trials.cost <= threshold_cost + slack)
+    return trials.success & (trials.cost <= threshold_cost)
 
 
 def mean_cost(cost: Array, reward: RewardMap) -> float:
@@ -47,8 +45,11 @@ def mean_cost(cost: Array, reward: RewardMap) -> float:
             positive.
     """
     if reward is RewardMap.RECIPROCAL and bool(np.all(cost > 0)):
-        return float(1.0 / np.mean(1.0 / cost))
-    return float(np.mean(cost))
+        mean = float(1.0 / np.mean(1.0 / cost))
+    else:
+        mean = float(np.mean(cost))
+    # A mean of equal costs can fall below each of them by a rounding error.
+    return max(mean, float(np.min(cost)))
 
 
 def update(
