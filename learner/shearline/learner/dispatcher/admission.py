@@ -68,7 +68,9 @@ def bye(desk: Desk, event: ByeReceived) -> None:
 
 def gone(desk: Desk, event: EvaluatorGone) -> None:
     """Stop waiting for a boot whose liveliness vanished."""
-    _lapse_boot(desk, event.evaluator, event.boot, LapseReason.GONE)
+    for token in list(desk.book.held_by.get(event.evaluator, ())):
+        if desk.book.attempts[token].boot == event.boot:
+            desk.lapse(desk.book.attempts[token], LapseReason.GONE)
     known = desk.roster.get(event.evaluator)
     if known is not None and known.boot == event.boot and not (known.left or known.gone):
         known.gone = True
@@ -141,9 +143,9 @@ def _admit(desk: Desk, name: str, message: Hello) -> str:
     newcomer = Evaluator.of(name, message, desk.clock_s)
     if not desk.roster.admit(newcomer):
         return f"{EVALUATORS_MAX} evaluators are here already: no more are admitted"
-    for boot in {desk.book.attempts[t].boot for t in desk.book.held_by.get(name, ())}:
-        if boot != message.boot:
-            _lapse_boot(desk, name, boot, LapseReason.REPLACED)
+    for token in list(desk.book.held_by.get(name, ())):
+        if desk.book.attempts[token].boot != message.boot:
+            desk.lapse(desk.book.attempts[token], LapseReason.REPLACED)
     desk.say(f"{name} joins: {message.kind}, {message.credits} credits, {message.engine}")
     _welcome(desk, newcomer)
     return ""
@@ -162,10 +164,3 @@ def _welcome(desk: Desk, evaluator: Evaluator) -> None:
             held=held,
         ),
     )
-
-
-def _lapse_boot(desk: Desk, name: str, boot: str, reason: LapseReason) -> None:
-    for token in list(desk.book.held_by.get(name, ())):
-        attempt = desk.book.attempts[token]
-        if attempt.boot == boot:
-            desk.lapse(attempt, reason)

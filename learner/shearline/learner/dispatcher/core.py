@@ -31,7 +31,7 @@ from shearline.learner.dispatcher.events import (
     ResultReceived,
     Tick,
 )
-from shearline.learner.dispatcher.instructions import Broadcast, Instruction
+from shearline.learner.dispatcher.instructions import Broadcast, Ending, Instruction
 from shearline.learner.dispatcher.rules import Rules
 from shearline.learner.dispatcher.states import RUN, RunCause, RunState
 from shearline.protocol.messages import Command, CommandKind, Refused, Verdict
@@ -193,7 +193,7 @@ def _proposals(desk: Desk, event: ProposalsReady) -> None:
 
 def _learner_failed(desk: Desk, event: LearnerFailed) -> None:
     if desk.state is not RunState.ENDED:
-        episodes.dismiss(desk, ok=False, why=event.why)
+        episodes.dismiss(desk, Ending.FAILED, event.why)
 
 
 def _command(desk: Desk, event: OperatorCommand) -> None:

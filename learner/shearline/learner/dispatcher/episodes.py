@@ -18,7 +18,7 @@ from shearline.learner.dispatcher.entries import (
     TrialsProposed,
 )
 from shearline.learner.dispatcher.events import ProposalsReady
-from shearline.learner.dispatcher.instructions import Ask, Broadcast, EndRun
+from shearline.learner.dispatcher.instructions import Ask, Broadcast, Ending, EndRun
 from shearline.learner.dispatcher.rules import ATTEMPTS_MAX
 from shearline.learner.dispatcher.states import RunCause, RunState, TrialState
 from shearline.protocol.messages import (
@@ -34,7 +34,7 @@ def ask(desk: Desk) -> None:
     episode = len(desk.book.closed)
     if episode >= desk.rules.episodes:
         desk.journal(RunEnded(at_s=desk.now_s, stimulus=desk.stimulus, ok=True, why=""))
-        dismiss(desk, ok=True, why="")
+        dismiss(desk, Ending.COMPLETE, "")
         return
     desk.asking = episode
     tells = desk.book.told[-1] if desk.book.told else ()
@@ -80,10 +80,10 @@ def stop(desk: Desk, why: str) -> None:
 def finish_stop(desk: Desk) -> None:
     """End a stopping run once nothing runs or the grace is over; it can be resumed later."""
     if not desk.book.live or desk.clock_s >= desk.stop_by_s:
-        dismiss(desk, ok=False, why=desk.stop_why)
+        dismiss(desk, Ending.STOPPED, desk.stop_why)
 
 
-def dismiss(desk: Desk, *, ok: bool, why: str) -> None:
+def dismiss(desk: Desk, ending: Ending, why: str) -> None:
     """Let go of everyone; what is on record decides whether the run can be resumed."""
     desk.enter(RunCause.END)
     desk.asking = None
@@ -91,13 +91,13 @@ def dismiss(desk: Desk, *, ok: bool, why: str) -> None:
     desk.out.append(Broadcast(Command(kind=CommandKind.STOP, why=said)))
     desk.say(f"ended: {said}")
     last = desk.book.told[-1] if desk.book.told else ()
-    desk.out.append(EndRun(ok=ok, why=why, tells=(*last, *desk.book.tells())))
+    desk.out.append(EndRun(ending=ending, why=why, tells=(*last, *desk.book.tells())))
 
 
 def _fail(desk: Desk, why: str) -> None:
     """End the run for good: going on would only repeat it."""
     desk.journal(RunEnded(at_s=desk.now_s, stimulus=desk.stimulus, ok=False, why=why[:2048]))
-    dismiss(desk, ok=False, why=why[:2048])
+    dismiss(desk, Ending.FAILED, why[:2048])
 
 
 def _is_exhausted(desk: Desk, trial: TrialRow) -> bool:

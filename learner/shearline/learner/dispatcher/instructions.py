@@ -7,6 +7,8 @@ several steps into one write, as long as that write comes first.
 
 from __future__ import annotations
 
+import enum
+
 import msgspec
 
 from shearline.learner.dispatcher.entries import Entry
@@ -19,6 +21,14 @@ class Told(msgspec.Struct, frozen=True):
     trial: int
     cost: float
     success: bool
+
+
+class Ending(enum.StrEnum):
+    """How this epoch of a run ended."""
+
+    COMPLETE = "complete"  # all episodes are closed
+    STOPPED = "stopped"  # can be resumed
+    FAILED = "failed"
 
 
 class Instruction(msgspec.Struct, frozen=True):
@@ -69,11 +79,11 @@ class EndRun(Instruction, frozen=True):
     """Nothing more will be handed out: tell the learner the rest and shut down.
 
     Attributes:
-        ok: Whether all episodes were closed.
-        why: One sentence if not.
+        ending: How it ended.
+        why: One sentence unless it is complete.
         tells: Outcomes that the learner has not heard yet.
     """
 
-    ok: bool
+    ending: Ending
     why: str
     tells: tuple[Told, ...]

@@ -6,6 +6,9 @@ from shearline.learner.dispatcher.core import Dispatcher
 from shearline.learner.dispatcher.states import TrialState
 from shearline.protocol.messages import Status
 
+#: Episodes a status looks back on; keeps it far below what one message may hold.
+HISTORY_MAX = 1000
+
 
 def status(
     dispatcher: Dispatcher, *, run: str, learner: str, rate_hz: float, step_ms_max: float
@@ -44,6 +47,6 @@ def status(
         rate_hz=rate_hz,
         step_ms_max=step_ms_max,
         evaluators=[desk.describe(evaluator) for evaluator in desk.roster],
-        history=book.closed,
+        history=book.closed[-HISTORY_MAX:],
         at_s=desk.now_s,
     )

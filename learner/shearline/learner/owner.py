@@ -1,0 +1,228 @@
+"""The owner: the one thread that decides, writes and answers.
+
+In each step it takes what waits in the inbox, lets the dispatcher decide, writes the journal
+entries of the whole step in one go, and only then lets anyone know. It never waits for a peer.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from queue import Empty
+
+from shearline.learner.base import Recommendation
+from shearline.learner.config import RunConfig
+from shearline.learner.dispatcher import Dispatcher, status
+from shearline.learner.dispatcher.entries import EpisodeDone, LearnerBooted, TrialsProposed
+from shearline.learner.dispatcher.events import Begin, Event, Tick
+from shearline.learner.dispatcher.instructions import (
+    Ask,
+    Broadcast,
+    Ending,
+    EndRun,
+    Instruction,
+    Journal,
+    Publish,
+    Say,
+    Send,
+)
+from shearline.learner.dispatcher.states import RunState
+from shearline.learner.fitter import Fitter, Modelled, Recommended
+from shearline.learner.inbox import Inbox
+from shearline.learner.incoming import Incoming
+from shearline.learner.journal import Journal as JournalFile
+from shearline.learner.outgoing import Outgoing
+from shearline.learner.pulse import Pulse
+from shearline.learner.signals import Hurry
+from shearline.protocol.link import Arrival, Presence
+from shearline.protocol.messages import Snapshot, Status
+
+#: Items taken in one step: one write for all of them, and a bound on how long a step takes.
+STEP_ITEMS_MAX = 32
+
+STATUS_EVERY_S = 0.5
+
+#: How long the end waits for evaluators to leave, and for the learner's last word [s].
+LINGER_S = 2.0
+RECOMMEND_S = 120.0
+
+#: Entries worth waiting for the disk: rare, and dear to lose even to a power cut.
+_DEAR = (LearnerBooted, TrialsProposed, EpisodeDone)
+
+_log = logging.getLogger("shearline.learner")
+
+
+class Owner:
+    """Leads one epoch of a run.
+
+    Args:
+        config: The run's.
+        run: The run's name.
+        dispatcher: Decides.
+        journal: Where its entries go.
+        fitter: The learner behind it.
+        outgoing: Where its messages go.
+        inbox: Where everything comes from.
+        on_status: Called with each status.
+
+    Attributes:
+        recommendation: The learner's last word.
+        ending: How the run ended, and
+        why: why, if not by completing.
+    """
+
+    def __init__(
+        self,
+        config: RunConfig,
+        run: str,
+        dispatcher: Dispatcher,
+        journal: JournalFile,
+        fitter: Fitter,
+        outgoing: Outgoing,
+        inbox: Inbox,
+        on_status: Callable[[Status], None] | None = None,
+    ) -> None:
+        self.config = config
+        self.name = run
+        self.dispatcher = dispatcher
+        self.recommendation: Recommendation | None = None
+        self.ending = Ending.STOPPED
+        self.why = "interrupted twice: start it again to resume"
+        self._journal = journal
+        self._fitter = fitter
+        self._outgoing = outgoing
+        self._inbox = inbox
+        self._on_status = on_status
+        self._incoming = Incoming()
+        self._pulse = Pulse()
+        self._tick_s = min(config.lease_s / 8, 0.1)
+        # Reads like the epoch, but neither jumps nor goes back while the process lives.
+        self._zero_s = time.time() - time.monotonic()
+        self._next_tick_s = self._next_status_s = 0.0
+        self._end_by_s: float | None = None
+        self._has_last_word = False
+
+    def begin(self) -> int:
+        """Take the run over; return the epoch, which is on disk by then."""
+        self._fitter.start(self.dispatcher.book)
+        self._carry_out(self.dispatcher.handle(Begin(), self._now_s()))
+        return self.dispatcher.book.epoch
+
+    def run(self) -> None:
+        """Lead the run until it has ended and everyone knows, or cannot be helped.
+
+        Raises:
+            RecordError: If the journal cannot be written; nothing unwritten was told to anyone.
+        """
+        while not self._is_over():
+            items = self._take()
+            began_s = time.perf_counter()
+            out: list[Instruction] = []
+            for item in items:
+                if isinstance(item, Hurry):
+                    return
+                event = self._event(item)
+                if event is not None:
+                    out += self.dispatcher.handle(event, self._now_s())
+            if self._now_s() >= self._next_tick_s:
+                self._next_tick_s = self._now_s() + self._tick_s
+                out += self.dispatcher.handle(Tick(), self._now_s())
+            self._carry_out(out)
+            if self._now_s() >= self._next_status_s:
+                self._show()
+            self._pulse.step(time.perf_counter() - began_s)
+        self._show()
+        _log.info(
+            "steps: p99 %.2f ms, longest %.2f ms; malformed %d, dropped %d",
+            1e3 * self._pulse.step_s_p99(),
+            1e3 * self._pulse.step_s_max,
+            self._incoming.malformed,
+            self._inbox.dropped,
+        )
+
+    # -- in ---------------------------------------------------------------------------------
+
+    def _now_s(self) -> float:
+        return self._zero_s + time.monotonic()
+
+    def _take(self) -> list[object]:
+        """Wait for something to do until the next tick, then take what else is there."""
+        items: list[object] = []
+        try:
+            items.append(self._inbox.get(timeout=max(self._next_tick_s - self._now_s(), 0.0005)))
+            while len(items) < STEP_ITEMS_MAX:
+                items.append(self._inbox.get_nowait())
+        except Empty:
+            pass
+        return items
+
+    def _event(self, item: object) -> Event | None:
+        if isinstance(item, Event):
+            return item
+        if isinstance(item, Arrival):
+            self._outgoing.copy(item.key, item.payload, self._now_s(), sent=False)
+        if isinstance(item, Arrival | Presence):
+            return self._incoming.event(item)
+        if isinstance(item, Modelled):
+            self._outgoing.publish(
+                Snapshot(
+                    episode=item.episode,
+                    learner=self.config.learner,
+                    model=item.model,
+                    at_s=self._now_s(),
+                )
+            )
+        if isinstance(item, Recommended):
+            self.recommendation, self._has_last_word = item.recommendation, True
+        return None
+
+    # -- out --------------------------------------------------------------------------------
+
+    def _carry_out(self, out: list[Instruction]) -> None:
+        entries = [i.entry for i in out if isinstance(i, Journal)]
+        if entries:
+            self._journal.append(entries, sync=any(isinstance(e, _DEAR) for e in entries))
+        for instruction in out:
+            self._effect(instruction)
+
+    def _effect(self, instruction: Instruction) -> None:
+        match instruction:
+            case Send(evaluator, message):
+                self._outgoing.send(evaluator, message, self._now_s())
+            case Publish(message):
+                self._outgoing.publish(message)
+            case Broadcast(message):
+                self._outgoing.broadcast(message, self._now_s())
+            case Say(stimulus, text):
+                _log.info("[%d.%d] %s", self.dispatcher.book.epoch, stimulus, text)
+            case Ask():
+                self._fitter.ask(instruction)
+                self._next_status_s = 0.0
+            case EndRun(ending, why, tells):
+                self.ending, self.why = ending, why
+                self._end_by_s = self._now_s() + LINGER_S
+                self._fitter.finish(tells)
+
+    def _show(self) -> None:
+        now_s = self._now_s()
+        self._next_status_s = now_s + STATUS_EVERY_S
+        shown = status(
+            self.dispatcher,
+            run=self.name,
+            learner=self.config.learner,
+            rate_hz=self._pulse.rate_hz(self.dispatcher.book.tally.counted, now_s),
+            step_ms_max=1e3 * self._pulse.step_s_max,
+        )
+        self._outgoing.publish(shown)
+        if self._on_status is not None:
+            self._on_status(shown)
+
+    def _is_over(self) -> bool:
+        """Tell whether the run has ended, the learner had its word, and the evaluators left."""
+        if self._end_by_s is None or self.dispatcher.state is not RunState.ENDED:
+            return False
+        late_s = self._now_s() - self._end_by_s
+        roster = self.dispatcher.desk.roster
+        alone = all(e.left or e.gone for e in roster)
+        return (alone or late_s > 0.0) and (self._has_last_word or late_s > RECOMMEND_S)

@@ -1,0 +1,144 @@
+"""What a run came to: the one value that scripts, people and ``summary.json`` read."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from shearline.learner.base import Recommendation
+from shearline.learner.config import RunConfig
+from shearline.learner.dispatcher.book import Book
+from shearline.learner.dispatcher.instructions import Ending
+from shearline.protocol.errors import RecordError
+from shearline.protocol.messages import EpisodeClosed
+
+
+class Advice(msgspec.Struct, frozen=True, kw_only=True):
+    """The recommended tuple by name, and what may be expected of it; costs may be unknown."""
+
+    theta: dict[str, float]
+    success_probability: float
+    interval: tuple[float, float]
+    cost: float | None
+
+
+class EpisodeSummary(msgspec.Struct, frozen=True, kw_only=True):
+    """One closed episode."""
+
+    episode: int
+    trials: int
+    successes: int
+    success_rate: float
+    mean_cost: float | None
+    best_cost: float | None
+
+
+class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
+    """One run.
+
+    Attributes:
+        state: How it ended; a stopped run can be resumed.
+        why: One sentence unless complete.
+        counted: Trials with an outcome, ``late`` ones among them.
+        lost: Trials without one.
+        wall_s: How long this process worked on it [s].
+    """
+
+    run: str
+    task: str
+    learner: str
+    seed: int
+    episodes: list[EpisodeSummary]
+    counted: int
+    lost: int
+    duplicates: int
+    late: int
+    aborted: int
+    rejected: int
+    recommendation: Advice | None
+    wall_s: float
+    state: Ending
+    why: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, fit for JSON."""
+        plain: dict[str, Any] = msgspec.to_builtins(self)
+        return plain
+
+
+def summarise(
+    config: RunConfig,
+    book: Book,
+    recommendation: Recommendation | None,
+    *,
+    run: str,
+    resends: int,
+    wall_s: float,
+    ending: Ending,
+    why: str,
+) -> RunSummary:
+    """Return what the book, and the learner's last word, amount to."""
+    tally = book.tally
+    return RunSummary(
+        run=run,
+        task=config.task.name,
+        learner=config.learner,
+        seed=config.seed,
+        episodes=[_episode(closed) for closed in book.closed],
+        counted=tally.counted,
+        lost=tally.lost,
+        duplicates=tally.surplus + resends,
+        late=tally.late,
+        aborted=tally.aborted,
+        rejected=tally.rejected,
+        recommendation=None if recommendation is None else _advice(config, recommendation),
+        wall_s=wall_s,
+        state=ending,
+        why=why,
+    )
+
+
+def write(path: Path, text: str) -> None:
+    """Replace a file as a whole: readers see the old one or the new one.
+
+    Raises:
+        RecordError: If it cannot be written.
+    """
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_text(text)
+        beside.replace(path)
+    except OSError as fault:
+        beside.unlink(missing_ok=True)
+        raise RecordError(f"cannot write {path}: {fault.strerror}: make room there") from None
+
+
+def to_json(summary: RunSummary) -> str:
+    """Return the summary as one line of JSON."""
+    return json.dumps(summary.to_dict(), allow_nan=False)
+
+
+def _episode(closed: EpisodeClosed) -> EpisodeSummary:
+    return EpisodeSummary(
+        episode=closed.episode,
+        trials=closed.trials,
+        successes=closed.successes,
+        success_rate=closed.success_rate,
+        mean_cost=closed.mean_cost,
+        best_cost=closed.best_cost,
+    )
+
+
+def _advice(config: RunConfig, found: Recommendation) -> Advice:
+    low, high = found.interval
+    return Advice(
+        theta=config.space.to_dict(found.theta),
+        success_probability=float(found.success_probability),
+        interval=(float(low), float(high)),
+        cost=float(found.cost) if math.isfinite(found.cost) else None,
+    )
