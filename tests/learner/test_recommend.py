@@ -1,0 +1,107 @@
+from __future__ import annotations
+
+from math import comb, isnan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shearline.learner.ledger import Trials
+from shearline.learner.recommend import (
+    ON_POLICY_TRIALS,
+    Focus,
+    clopper_pearson_low,
+    elite_focus,
+    recommendation,
+)
+from shearline.protocol.space import Space
+from shearline.sims.functions import fragile_ridge, ridge_success
+from shearline.studies.benchmark import run_learner
+
+SPACE = Space({"a": ("N", 0.0, 10.0), "b": ("m", -1.0, 1.0)})
+MIDDLE = Focus(np.array([0.5, 0.5]), np.array([0.1, 0.2]))
+
+
+def trials_around(count: int, wins: int, seed: int = 0) -> Trials:
+    rng = np.random.default_rng(seed)
+    success = np.arange(count) < wins
+    cost = np.where(success, 0.4 + 0.1 * rng.random(count), 14.8)
+    u = np.clip(0.5 + 0.1 * rng.standard_normal((count, 2)), 0.0, 1.0)
+    order = rng.permutation(count)
+    return Trials(np.arange(count), u, cost[order], success[order])
+
+
+@given(count=st.integers(1, 80), data=st.data())
+def test_the_bound_is_where_what_was_seen_has_a_chance_of_one_in_twenty(
+    count: int, data: st.DataObject
+) -> None:
+    wins = data.draw(st.integers(1, count))
+    low = clopper_pearson_low(wins, count)
+    tail = sum(comb(count, k) * low**k * (1 - low) ** (count - k) for k in range(wins, count + 1))
+    assert tail == pytest.approx(0.05, rel=1e-6)
+
+
+def test_sixty_of_sixty_support_a_claim_of_95_percent_and_nothing_supports_none() -> None:
+    assert clopper_pearson_low(60, 60) == pytest.approx(0.9513, abs=1e-4)
+    assert clopper_pearson_low(0, 60) == 0.0
+    assert clopper_pearson_low(0, 0) == 0.0
+
+
+@given(count=st.integers(0, 100), data=st.data())
+def test_what_is_said_is_consistent(count: int, data: st.DataObject) -> None:
+    trials = trials_around(count, data.draw(st.integers(0, count)))
+    answer = recommendation(SPACE, trials, MIDDLE)
+    low, high = answer.interval
+    assert 0.0 <= low <= answer.success_probability <= high <= 1.0
+    assert isnan(answer.cost) == (not trials.last(ON_POLICY_TRIALS).success.any())
+
+
+def test_the_claim_rests_on_the_latest_trials_alone() -> None:
+    bad, good = trials_around(200, 0), trials_around(60, 60)
+    both = Trials(
+        np.arange(260),
+        np.concatenate([bad.u, good.u]),
+        np.concatenate([bad.cost, good.cost]),
+        np.concatenate([bad.success, good.success]),
+    )
+    assert recommendation(SPACE, both, MIDDLE).interval[0] == pytest.approx(0.9513, abs=1e-4)
+
+
+def test_the_cheapest_success_is_not_what_is_recommended() -> None:
+    u = np.concatenate([np.full((20, 2), 0.3), [[0.9, 0.9]]])
+    cost = np.concatenate([np.full(20, 0.5), [0.01]])
+    trials = Trials(np.arange(21), u, cost, np.ones(21, dtype=np.bool_))
+    assert np.linalg.norm(elite_focus(trials, 2).centre - 0.3) < 0.1
+
+
+def test_before_any_success_the_middle_of_the_box_is_all_there_is() -> None:
+    focus = elite_focus(trials_around(5, 0), 2)
+    assert focus.centre.tolist() == [0.5, 0.5]
+
+
+def test_the_region_holds_half_of_the_recent_successes() -> None:
+    trials = trials_around(60, 41)
+    region = recommendation(SPACE, trials, MIDDLE).region
+    theta = SPACE.denormalise(trials.u[trials.success])
+    inside = np.sum(((theta - region["centre"]) / region["radius"]) ** 2, axis=1) <= 1.0 + 1e-9
+    assert inside.sum() == 21
+
+
+def test_a_single_success_makes_no_region() -> None:
+    assert recommendation(SPACE, trials_around(10, 1), MIDDLE).region == {}
+
+
+@pytest.mark.slow
+def test_on_the_ridge_problem_what_is_recommended_is_robust_and_not_overclaimed() -> None:
+    problem = fragile_ridge()
+    truth, low, cheapest = [], [], []
+    for seed in range(6):
+        run = run_learner("psp", problem, episodes=10, episode_length=20, seed=seed)
+        truth.append(float(ridge_success(problem.space.normalise(run.recommendation.theta))))
+        low.append(run.recommendation.interval[0])
+        best = int(np.argmin(np.where(run.success, run.cost, np.inf)))
+        cheapest.append(float(ridge_success(problem.space.normalise(run.theta[best]))))
+    assert np.mean(truth) > 0.93
+    assert np.sum(np.array(truth) >= np.array(low)) >= 5
+    assert np.mean(cheapest) < 0.6
