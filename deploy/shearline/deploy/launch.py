@@ -18,6 +18,7 @@ from typing import Any, Protocol
 
 from shearline.deploy import processes
 from shearline.deploy.observe import Observer
+from shearline.deploy.options import reach
 from shearline.deploy.processes import Child, spawn_command
 from shearline.protocol.errors import LinkError, RecordError, ShearlineError
 from shearline.protocol.messages import CommandKind, Status
@@ -58,7 +59,6 @@ class Launch:
         evaluators: How many to start, 0 or more.
         task: What evaluators load (``file:function``), or ``None`` for the learner's own.
         learner_arguments: Further arguments of ``shearline learner``.
-        show: Where people look.
     """
 
     run_dir: Path
@@ -66,21 +66,26 @@ class Launch:
     evaluators: int
     task: str | None
     learner_arguments: list[str]
-    show: Show
+    _show: Show = field(init=False)
     _children: dict[str, Child] = field(default_factory=dict, init=False)
     _restarts: dict[str, int] = field(default_factory=dict, init=False)
     _interrupted: bool = field(default=False, init=False)
 
-    def run(self) -> dict[str, Any]:
+    def run(self, show: Show) -> dict[str, Any]:
         """Run to the end and return the summary.
+
+        Args:
+            show: Where people look.
 
         Raises:
             RunFailed: If the learner gave up.
             LinkError: If it could not listen.
             KeyboardInterrupt: After an orderly end, if Ctrl-C asked for it.
         """
+        self._show = show
         with _interruptible(self._interrupt):
             try:
+                self.run_dir.mkdir(parents=True, exist_ok=True)
                 for name in self._names():
                     self._start(name)
                 self._watch()
@@ -99,15 +104,10 @@ class Launch:
         if name == "learner":
             return ["learner", *self.learner_arguments, "--listen", self.listen]
         task = ["--task", self.task] if self.task else []
-        return ["evaluator", "--connect", self.reach, "--name", name, *task]
-
-    @property
-    def reach(self) -> str:
-        """Where a process on this machine reaches the learner."""
-        return self.listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
+        return ["evaluator", "--connect", reach(self.listen), "--name", name, *task]
 
     def _start(self, name: str) -> None:
-        log = self.run_dir / f"{name}.log"
+        log = self.run_dir / f"{name}.out"
         self._children[name] = spawn_command(name, self._arguments(name), log)
 
     def _look_after(self) -> bool:
@@ -128,7 +128,7 @@ class Launch:
         if times > RESTARTS_MAX:
             self._give_up(name, child)
             return
-        self.show.say(f"{name} died ({_fate(child)}), started again ({times} of {RESTARTS_MAX})")
+        self._show.say(f"{name} died ({_fate(child)}), started again ({times} of {RESTARTS_MAX})")
         self._start(name)
 
     def _give_up(self, name: str, child: Child) -> None:
@@ -137,7 +137,7 @@ class Launch:
         text = f"{name} died {RESTARTS_MAX + 1} times ({_fate(child)}): see {child.log}"
         if name == "learner" or len(self._children) == 1:
             raise RunFailed(text)
-        self.show.say(text)
+        self._show.say(text)
 
     # -- watching ------------------------------------------------------------------------------
 
@@ -148,7 +148,7 @@ class Launch:
         with observer:
             while self._look_after() and not self._interrupted:
                 for status in observer.statuses(LOOK_S):
-                    self.show.update(status)
+                    self._show.update(status)
                     if status.state == "ended":
                         self._wait_for_the_end()
                         return
@@ -163,7 +163,7 @@ class Launch:
             return self._interrupted or not self._look_after()
 
         try:
-            return Observer.attach(self.reach, timeout_s=None, cancelled=over)
+            return Observer.attach(reach(self.listen), timeout_s=None, cancelled=over)
         except LinkError:
             if over():
                 return None

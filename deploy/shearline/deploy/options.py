@@ -72,3 +72,25 @@ def add_run(command: argparse.ArgumentParser) -> None:
     group.add_argument("--lease", type=seconds, metavar="S", help="lease of an attempt [s]")
     group.add_argument("--out", metavar="RUN_DIR", help="run folder (default runs/TASK-TIME)")
     group.add_argument("--no-record", action="store_true", help="write no record.mcap")
+
+
+def reach(listen: str) -> str:
+    """Return where a process on this machine reaches who listens at an endpoint."""
+    return listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
+
+
+def run_arguments(arguments: argparse.Namespace) -> list[str]:
+    """Return what :func:`add_run` parsed, as arguments again, for a child process."""
+    values = {
+        "--task": arguments.task,
+        "--learner": arguments.learner,
+        "--episodes": arguments.episodes,
+        "--trials": arguments.trials,
+        "--seed": arguments.seed,
+        "--lease": arguments.lease,
+    }
+    words = [str(arguments.config)] if arguments.config is not None else []
+    for option, value in values.items():
+        if value is not None:
+            words += [option, str(value)]
+    return words + (["--no-record"] if arguments.no_record else [])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from shearline.deploy.exits import Exit
 from shearline.deploy.options import Subparsers, add_json, seconds
@@ -39,7 +39,7 @@ def bench_learner(arguments: argparse.Namespace) -> int:
     return _print(measure(), as_json=arguments.json, single=False)
 
 
-def _print(rows: list[Mapping[str, object]], *, as_json: bool, single: bool) -> int:
+def _print(rows: Sequence[Mapping[str, object]], *, as_json: bool, single: bool) -> int:
     if as_json:
         print(json.dumps(rows[0] if single else rows))
         return Exit.OK

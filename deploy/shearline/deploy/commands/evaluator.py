@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 
-from shearline.deploy.options import Subparsers, add_connect, at_least, positive
+from shearline.deploy.options import Subparsers, add_connect, positive, seconds
 
 
 def register(commands: Subparsers) -> None:
@@ -21,9 +23,10 @@ def register(commands: Subparsers) -> None:
     command.add_argument("--credits", type=positive, default=2, help="trials held at once")
     command.add_argument(
         "--patience",
-        type=at_least(0),
+        type=seconds,
+        default=10.0,
         metavar="S",
-        help="give up after S seconds without a learner (default: never)",
+        help="wait at most S seconds for a learner at the start (default 10)",
     )
     command.add_argument("--forever", action="store_true", help="wait for the next run too")
     command.add_argument("--no-traces", action="store_true", help="send no traces to the record")
@@ -32,4 +35,25 @@ def register(commands: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the worker in this process."""
-    raise NotImplementedError(arguments)
+    import logging  # noqa: PLC0415 - with what logs
+
+    from shearline.evaluator.tasks import load_task  # noqa: PLC0415 - may import the user's task
+    from shearline.evaluator.worker import (  # noqa: PLC0415 - loads zenoh
+        WorkerConfig,
+        default_name,
+        run_worker,
+    )
+
+    logging.basicConfig(format="%(asctime)s %(message)s", level=logging.INFO, stream=sys.stderr)
+    config = WorkerConfig(
+        connect=arguments.connect,
+        name=arguments.name or default_name(),
+        credits=arguments.credits,
+        wait_s=None if arguments.forever else arguments.patience,
+        forever=arguments.forever,
+        traces=not arguments.no_traces,
+    )
+    end = run_worker(config, load_task(arguments.task) if arguments.task else None)
+    print(f"shearline: {end.why}", file=sys.stderr, flush=True)
+    # A session that will not close, or a trial that will not return, must not keep us here.
+    os._exit(end.code)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
 from shearline.deploy.exits import Exit
 from shearline.deploy.options import Subparsers, add_connect, add_json
+from shearline.protocol.errors import ConfigError
 
 
 def register(commands: Subparsers) -> None:
@@ -27,22 +29,37 @@ def register(commands: Subparsers) -> None:
 
 def list_trials(arguments: argparse.Namespace) -> int:
     """Print one line per trial: JSON objects, or columns for people."""
-    from shearline.record.reader import open as open_run  # noqa: PLC0415 - mcap loads on use
+    from shearline.record.reader import open_run  # noqa: PLC0415 - mcap loads on use
 
-    rows = open_run(arguments.run).trial_rows()
+    run = open_run(arguments.run)
+    for sentence in run.damage:
+        print(f"shearline: {sentence}", file=sys.stderr)
     if arguments.json:
-        for row in rows:
+        for row in run.trials():
             print(json.dumps(row))
         return Exit.OK
-    print(f"{'trial':>5} {'episode':>7} {'outcome':<8} {'cost':>8} {'attempts':>8}  evaluator")
-    for row in rows:
+    print(
+        f"{'trial':>5} {'episode':>7}  {'outcome':<8} {'cost':>9} {'attempts':>8}  evaluator, why"
+    )
+    for row in run.trials():
+        cost = "-" if row["cost"] is None else f"{row['cost']:.4g}"
         print(
-            f"{row['trial']:>5} {row['episode']:>7} {row['outcome']:<8} {row['cost']:>8.3f}"
-            f" {row['attempts']:>8}  {row['evaluator']}"
+            f"{row['trial']:>5} {row['episode'] + 1:>7}  {row['outcome']:<8} {cost:>9}"
+            f" {row['attempts']:>8}  {row['evaluator']} {row['why']}"
         )
     return Exit.OK
 
 
 def view_run(arguments: argparse.Namespace) -> int:
     """Open the run in Rerun's viewer, or write what it would show to a file."""
-    raise NotImplementedError
+    from shearline.record import view  # noqa: PLC0415 - loads rerun
+
+    if arguments.live:
+        view.view_live(arguments.connect)
+        return Exit.OK
+    if arguments.run is None:
+        raise ConfigError("which run? give its folder, or --live for the one that is going on")
+    run = view.save(arguments.run, arguments.save) if arguments.save else view.view(arguments.run)
+    for sentence in run.damage:
+        print(f"shearline: {sentence}", file=sys.stderr)
+    return Exit.OK

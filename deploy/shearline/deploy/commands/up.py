@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from shearline.deploy.exits import Exit
-from shearline.deploy.options import Subparsers, add_json, add_run, at_least
+from shearline.deploy.options import Subparsers, add_json, add_run, at_least, run_arguments
 
 
 def register(commands: Subparsers) -> None:
@@ -34,23 +34,26 @@ def run(arguments: argparse.Namespace) -> int:
     """Run to the end, then print the summary (with ``--json``: as the last line)."""
     from shearline.deploy.resolve import resolve_run  # noqa: PLC0415 - may import the user's task
 
-    from shearline.deploy.launch import Launch, free_endpoint  # noqa: PLC0415 - loads zenoh
+    asked = resolve_run(arguments)
+    from shearline.deploy.launch import Launch, QuietShow  # noqa: PLC0415 - loads zenoh
+    from shearline.protocol.link import check_endpoint, free_endpoint  # noqa: PLC0415
 
-    config, run_dir = resolve_run(arguments)
     launch = Launch(
-        config=config,
-        run_dir=run_dir,
-        listen=arguments.listen or free_endpoint(),
+        run_dir=asked.run_dir,
+        listen=check_endpoint(arguments.listen or free_endpoint()),
         evaluators=arguments.evaluators,
-        task=arguments.task,
-        plant=arguments.plant,
-        quiet=arguments.json,
+        task=asked.own_task,
+        learner_arguments=[*run_arguments(arguments), "--out", str(asked.run_dir)],
     )
-    summary = launch.run()
     if arguments.json:
-        print(json.dumps(summary))
-    else:
-        from shearline.deploy.summary import print_summary  # noqa: PLC0415 - loads rich
+        print(json.dumps(launch.run(QuietShow())))
+        return Exit.OK
 
-        print_summary(summary, run_dir)
+    from shearline.deploy.live import LiveShow  # noqa: PLC0415 - loads rich, for people only
+    from shearline.deploy.summary import print_summary  # noqa: PLC0415
+
+    with LiveShow() as show:
+        summary = launch.run(show)
+    space = asked.config.space
+    print_summary(summary, asked.run_dir, dict(zip(space.names, space.units, strict=True)))
     return Exit.OK

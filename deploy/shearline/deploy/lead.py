@@ -1,0 +1,89 @@
+"""A learner and the recorder beside it: the two processes that every run has.
+
+The recorder is a client like any other. Trials wait for it to be ready, for a moment; after that
+the learner never looks at it again until the run has ended.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+from shearline.deploy.options import reach
+from shearline.learner.config import RunConfig
+from shearline.learner.dispatcher.observed import history
+from shearline.learner.folder import JOURNAL
+from shearline.learner.journal import read
+from shearline.learner.run import serve
+from shearline.learner.summary import RunSummary
+from shearline.protocol.errors import RecordError
+from shearline.protocol.messages import Counted, EpisodeClosed
+from shearline.record.complete import complete
+from shearline.record.recorder import spawn
+
+#: A recorder starts within a second; a run does not wait longer than this for it [s].
+READY_S = 10.0
+#: How long the recorder may take to write what is left once the run has ended [s].
+FINISH_S = 10.0
+
+
+def lead(config: RunConfig, run_dir: Path, listen: str, *, resume: bool = False) -> RunSummary:
+    """Lead a run to its end and complete its record; see :func:`shearline.learner.run.serve`."""
+    recorder: list[subprocess.Popen[str]] = []
+
+    def begin() -> None:
+        if config.record:
+            recorder.append(spawn(reach(listen), run_dir.resolve().name, run_dir))
+            _wait_until_ready(recorder[0])
+
+    try:
+        summary = serve(config, run_dir, listen, resume=resume, on_listening=begin)
+    finally:
+        for process in recorder:
+            _finish(process)
+    if config.record:
+        _complete(run_dir)
+    return summary
+
+
+def _wait_until_ready(recorder: subprocess.Popen[str]) -> None:
+    """Wait for its one line, or for its end; in a thread, because a pipe cannot be timed."""
+    assert recorder.stdout is not None
+    reader = threading.Thread(target=recorder.stdout.readline, daemon=True)
+    reader.start()
+    reader.join(READY_S)
+    if recorder.poll() is not None or reader.is_alive():
+        _say("the recorder did not start: this run goes on without a record")
+
+
+def _finish(recorder: subprocess.Popen[str]) -> None:
+    try:
+        recorder.wait(FINISH_S)
+    except subprocess.TimeoutExpired:
+        recorder.kill()  # what it wrote is sealed when the record is completed
+        recorder.wait()
+
+
+def _complete(run_dir: Path) -> None:
+    """Put into the record what the journal has and it has not; a full disk is not a lost run."""
+    try:
+        missing = complete(run_dir, outcomes(run_dir))
+    except (RecordError, OSError) as error:
+        _say(f"the record is incomplete: {error}; the journal has everything")
+        return
+    if missing:
+        _say(f"{missing} messages were added to the record from the journal")
+
+
+def outcomes(run_dir: Path) -> Iterator[Counted | EpisodeClosed]:
+    """Yield what a run's journal says that observers should have heard."""
+    for message in history(read(run_dir / JOURNAL)):
+        if isinstance(message, Counted | EpisodeClosed):
+            yield message
+
+
+def _say(text: str) -> None:
+    print(f"shearline: {text}", file=sys.stderr, flush=True)
