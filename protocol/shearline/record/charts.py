@@ -8,6 +8,7 @@ right, ``y`` down, and shown for the trial under the cursor.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,18 +31,25 @@ class Chart:
     Attributes:
         lines: One polyline ``(points, 2)`` per series.
         grid: Polylines of the frame and the grid.
+        events: One upright line per event.
         marks: Where labels stand ``(labels, 2)``.
         labels: Their texts.
     """
 
     lines: list[Array]
     grid: list[Array]
+    events: list[Array]
     marks: Array
     labels: list[str]
 
 
 def chart(
-    t_s: npt.ArrayLike, series: list[npt.NDArray[np.float32]], low: float, high: float
+    t_s: npt.ArrayLike,
+    series: list[npt.NDArray[np.float32]],
+    low: float,
+    high: float,
+    *,
+    events: Sequence[tuple[float, str]] = (),
 ) -> Chart:
     """Lay out curves over a trial's clock.
 
@@ -50,16 +58,17 @@ def chart(
         series: One ``(samples,)`` per curve, in one unit.
         low: Value at the bottom.
         high: Value at the top; must exceed ``low``.
+        events: ``(t_s, name)``.
 
     Returns:
-        The chart, its lines thinned to what a screen can show.
+        The chart, its lines thinned to what a screen can show, peaks kept.
     """
     clock = np.asarray(t_s, dtype=np.float64)
     end_s = nice_above(float(clock[-1])) if clock.size and clock[-1] > 0 else 1.0
-    step = max(1, -(-clock.size // POINTS_MAX))
-    x = clock[::step] / end_s * WIDTH
+    kept = telling(series, POINTS_MAX)
+    x = clock[kept] / end_s * WIDTH
     lines = [
-        np.stack([x, _down(values[::step].astype(np.float64), low, high)], axis=1)
+        np.stack([x, _down(values[kept].astype(np.float64), low, high)], axis=1)
         for values in series
     ]
     fractions = np.linspace(0.0, 1.0, GRID_LINES + 1)
@@ -67,7 +76,36 @@ def chart(
     marks_x = np.stack([WIDTH * fractions[1:], np.full(GRID_LINES, HEIGHT + 3.0)], axis=1)
     labels_y = [_text(low + f * (high - low)) for f in fractions]
     labels_x = [f"{_text(f * end_s)} s" for f in fractions[1:]]
-    return Chart(lines, _grid(fractions), np.concatenate([marks_y, marks_x]), labels_y + labels_x)
+    return Chart(
+        lines=lines,
+        grid=_grid(fractions),
+        events=[_upright(at_s / end_s * WIDTH) for at_s, _ in events],
+        marks=np.concatenate([marks_y, marks_x]),
+        labels=labels_y + labels_x,
+    )
+
+
+def telling(series: Sequence[npt.NDArray[np.float32]], n: int) -> npt.NDArray[np.intp]:
+    """Return at most ``n`` indices that keep what curves are looked at for: peaks, and the end.
+
+    The samples are cut into equal bins; of each the one stays that is furthest from the bin's
+    mean, measured by each curve's own range.
+
+    Args:
+        series: Curves ``(samples,)`` that are thinned together.
+        n: At least 2.
+    """
+    values = np.nan_to_num(np.stack(series)).astype(np.float64)
+    samples = values.shape[1]
+    if samples <= n:
+        return np.arange(samples)
+    spread = np.ptp(values, axis=1, keepdims=True)
+    values /= np.where(spread > 0.0, spread, 1.0)
+    width = -(-(samples - 1) // (n - 1))
+    whole = (samples - 1) // width * width
+    bins = values[:, :whole].reshape(len(values), -1, width)
+    far = np.abs(bins - bins.mean(axis=2, keepdims=True)).max(axis=0).argmax(axis=1)
+    return np.append(np.arange(0, whole, width) + far, samples - 1)
 
 
 def nice_above(value: float) -> float:
@@ -103,6 +141,10 @@ def _grid(fractions: Array) -> list[Array]:
     rows = [np.array([[0.0, HEIGHT * f], [WIDTH, HEIGHT * f]]) for f in fractions[:-1]]
     columns = [np.array([[WIDTH * f, 0.0], [WIDTH * f, HEIGHT]]) for f in fractions[1:]]
     return [frame, *rows, *columns]
+
+
+def _upright(x: float) -> Array:
+    return np.array([[x, 0.0], [x, HEIGHT]])
 
 
 def _text(value: float) -> str:

@@ -6,7 +6,9 @@ columns as it likes; some names get more than a chart. Nothing is drawn here.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,11 +16,13 @@ import numpy.typing as npt
 from shearline.record.reader import Array, Trace
 
 #: Groups that people tune by, in the order in which charts are given to them.
-FIRST = ("depth", "push", "wiggle", "tau_ext", "wrench", "force", "speed")
-#: Shown in space, not as charts.
-SPATIAL = frozenset({"tip", "quat", "lock"})
-#: Lengths of this task's size are read in millimetres.
-MILLIMETRES = frozenset({"depth", "offset", "error"})
+FIRST = ("depth", "push_wiggle", "tau_ext", "wrench", "force", "speed")
+#: Shown in space or as a state, not as curves.
+NOT_CURVES = frozenset({"tip", "phase"})
+#: Groups that are read together, by head and unit.
+TOGETHER = {("push", "N"): "push_wiggle", ("wiggle", "N"): "push_wiggle"}
+#: Lengths of a key's size are read in millimetres.
+MILLIMETRES = frozenset({"depth", "offset", "error", "pin", "reference"})
 #: Names of a force at the tip, tried in this order.
 _FORCES = (
     ("wrench.fx", "wrench.fy", "wrench.fz"),
@@ -26,13 +30,16 @@ _FORCES = (
     ("force.x", "force.y", "force.z"),
 )
 
+#: Group to one limit per column, in the column's unit.
+Limits = Mapping[str, Sequence[float]]
+
 
 @dataclass(frozen=True, slots=True)
 class Group:
     """Columns that belong together.
 
     Attributes:
-        name: What stands before the dot.
+        name: What stands before the dot, with the unit where one head has two.
         unit: Of all of them.
         names: One per column.
         values: One ``(samples,)`` per column.
@@ -44,17 +51,36 @@ class Group:
     values: list[Array]
 
 
-def groups(trace: Trace) -> list[Group]:
-    """Return the groups of a trace, those that people tune by first."""
-    found: dict[tuple[str, str], Group] = {}
-    for name, (unit, values) in trace.columns.items():
-        head = name.split(".", 1)[0]
-        if unit == "m" and head in MILLIMETRES:
-            unit, values = "mm", values * np.float32(1000.0)  # noqa: PLW2901 - in people's unit
-        group = found.setdefault((head, unit), Group(head, unit, [], []))
-        group.names.append(name)
+def groups(trace: Trace, limits: Limits | None = None) -> list[Group]:
+    """Return the curves of a trace in groups, those that people tune by first.
+
+    Args:
+        trace: With columns of any names.
+        limits: Columns of these groups are given in per cent of their limit.
+    """
+    found: dict[str, Group] = {}
+    for column, (unit, values) in trace.columns.items():
+        head = column.split(".", 1)[0]
+        if head in NOT_CURVES:
+            continue
+        name = TOGETHER.get((head, unit), head)
+        if name in found and found[name].unit != unit:
+            name = f"{name}_{unit.replace(' ', '')}"
+        group = found.setdefault(name, Group(name, unit, [], []))
+        group.names.append(column)
         group.values.append(values)
-    return sorted(found.values(), key=lambda group: _rank(group.name))
+    readable = [_readable(group, (limits or {}).get(group.name)) for group in found.values()]
+    return sorted(readable, key=lambda group: _rank(group.name))
+
+
+def limits_of(settings: Mapping[str, Any]) -> Limits:
+    """Return the torque limits that a run's settings name, joints 1 to 4 and 5 to 7 [N m]."""
+    task = settings.get("task", {})
+    options = task.get("options", {}) if isinstance(task, Mapping) else {}
+    big, small = options.get("torque_big"), options.get("torque_small")
+    if not isinstance(big, float) or not isinstance(small, float):
+        return {}
+    return {"tau_ext": [big] * 4 + [small] * 3}
 
 
 def tip(trace: Trace) -> npt.NDArray[np.float32] | None:
@@ -69,6 +95,26 @@ def force(trace: Trace) -> npt.NDArray[np.float32] | None:
         if stacked is not None:
             return stacked
     return None
+
+
+def in_lock(trace: Trace) -> bool:
+    """Tell whether the tip is given in the frame of the lock, its z being the depth."""
+    if not {"tip.z", "depth"} <= set(trace.columns):
+        return False
+    return np.array_equal(trace.columns["tip.z"][1], trace.columns["depth"][1])
+
+
+def _readable(group: Group, limits: Sequence[float] | None) -> Group:
+    if limits is not None and len(limits) == len(group.values):
+        shares = [
+            values * np.float32(100.0 / limit)
+            for values, limit in zip(group.values, limits, strict=True)
+        ]
+        return Group(group.name, "% of limit", group.names, shares)
+    if group.unit == "m" and group.name in MILLIMETRES:
+        millimetres = [values * np.float32(1000.0) for values in group.values]
+        return Group(group.name, "mm", group.names, millimetres)
+    return group
 
 
 def _stacked(trace: Trace, names: tuple[str, ...]) -> npt.NDArray[np.float32] | None:

@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 import rerun.blueprint as rrb
 
-from shearline.record import charts
+from shearline.record import charts, columns
 from shearline.record.picture import CHARTS
 from shearline.record.topics import RunConfig
 
 #: Signals with plots of their own while playing.
-PLAYED = ("depth", "push", "wiggle", "wrench", "force", "tau_ext")
+PLAYED = columns.FIRST
 
 
 def layout(
@@ -26,6 +26,7 @@ def layout(
     groups: Sequence[str],
     *,
     tip: npt.NDArray[np.float32] | None,
+    in_lock: bool = False,
     active_tab: int = 0,
 ) -> rrb.Blueprint:
     """Return the layout.
@@ -34,9 +35,10 @@ def layout(
         config: Names and units of the parameters, if known.
         groups: Names of the groups of columns that traces have.
         tip: A typical path of the tip ``(samples, 3)`` [m], to look at; ``None`` if there is none.
+        in_lock: Whether the tip is given in the lock's frame, z pointing into it.
         active_tab: Which tab stands in front.
     """
-    eye = _eye(tip) if tip is not None and len(tip) else None
+    eye = _eye(tip, down_z=in_lock) if tip is not None and len(tip) else None
     tabs = rrb.Tabs(
         _trials(eye, has_traces=bool(groups)),
         _parameters(config),
@@ -80,16 +82,17 @@ def _space(name: str, eye: rrb.EyeControls3D) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(origin="/scene", name=name, eye_controls=eye, line_grid=False)
 
 
-def _eye(tip: npt.NDArray[np.float32]) -> rrb.EyeControls3D:
+def _eye(tip: npt.NDArray[np.float32], *, down_z: bool) -> rrb.EyeControls3D:
     """Look at the whole path from the side, a little from above."""
+    up = -1.0 if down_z else 1.0
     low, high = tip.min(axis=0), tip.max(axis=0)
     centre = (low + high) / 2.0
     size = max(float(np.linalg.norm(high - low)), 0.01)
     return rrb.EyeControls3D(
         kind="Orbital",
-        position=(centre + size * np.array([1.1, -1.1, 0.5])).tolist(),
+        position=(centre + size * np.array([0.75, -0.75, 0.4 * up])).tolist(),
         look_target=centre.tolist(),
-        eye_up=[0.0, 0.0, 1.0],
+        eye_up=[0.0, 0.0, up],
     )
 
 

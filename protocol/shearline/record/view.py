@@ -31,7 +31,8 @@ from shearline.record import columns
 from shearline.record.inbox import Inbox
 from shearline.record.layout import layout
 from shearline.record.picture import Picture
-from shearline.record.reader import Run, open_run, to_trace
+from shearline.record.reader import Run, Trace, open_run, to_trace
+from shearline.record.topics import RunConfig
 from shearline.record.viewer import viewer
 
 APPLICATION = "shearline"
@@ -143,8 +144,8 @@ class _Live:
         self.ended = False
         self._stream = stream
         self._picture = Picture(stream, None)
-        self._groups: list[str] | None = None
-        self._stream.send_blueprint(layout(None, [], tip=None))
+        self._laid_out = False
+        self._stream.send_blueprint(layout_for(None, None))
 
     def take(self, payload: bytes) -> None:
         try:
@@ -165,14 +166,28 @@ class _Live:
 
     def _trace(self, message: TraceData) -> None:
         trace = to_trace(message)
-        if self._groups is None:
-            self._groups = [group.name for group in columns.groups(trace)]
-            self._stream.send_blueprint(layout(None, self._groups, tip=columns.tip(trace)))
+        if not self._laid_out:
+            self._laid_out = True
+            self._stream.send_blueprint(layout_for(None, trace))
         self._picture.trace(trace)
+
+
+def layout_for(
+    config: RunConfig | None, trace: Trace | None, *, active_tab: int = 0
+) -> rrb.Blueprint:
+    """Return the layout for a run whose traces are like this one."""
+    if trace is None:
+        return layout(config, [], tip=None, active_tab=active_tab)
+    return layout(
+        config,
+        [group.name for group in columns.groups(trace)],
+        tip=columns.tip(trace),
+        in_lock=columns.in_lock(trace),
+        active_tab=active_tab,
+    )
 
 
 def _layout_of(run: Run) -> rrb.Blueprint:
     traced = run.traced()
     first = run.traces(traced[0])[0] if traced else None
-    groups = [group.name for group in columns.groups(first)] if first else []
-    return layout(run.config, groups, tip=columns.tip(first) if first else None)
+    return layout_for(run.config, first)
