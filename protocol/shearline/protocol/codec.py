@@ -9,7 +9,7 @@ who sent what; it never looks into the float32 columns of a trace.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from functools import cache
 from typing import Any, TypeVar, Union
 
@@ -63,6 +63,16 @@ TO_OBSERVER: tuple[type[Message], ...] = (
     TraceData,
     Wire,
 )
+
+#: What may come on each topic of :mod:`shearline.protocol.keys`.
+BY_TOPIC: Mapping[str, tuple[type[Message], ...]] = {
+    **{str(kind.__struct_config__.tag): (kind,) for kind in TO_LEARNER},
+    "trial": (Trial,),
+    "ack": (Ack,),
+    "cmd": (Welcome, Refused, Command),
+    "all/cmd": (Command,),
+    "op/cmd": FROM_OPERATOR,
+}
 
 #: Enough of a foreign sentence to find the mistake, too little to fill a log.
 _REASON_CHARS_MAX = 200

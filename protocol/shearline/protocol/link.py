@@ -13,7 +13,7 @@ import re
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -240,8 +240,15 @@ def discover(
     timeout_s: float | None = 5.0,
     *,
     cancelled: Callable[[], bool] | None = None,
+    besides: Collection[tuple[str, int]] = (),
 ) -> tuple[str, int]:
     """Wait for a learner to be alive.
+
+    Args:
+        link: Open client session.
+        timeout_s: How long to wait [s]; ``None`` waits for ever.
+        cancelled: Asked at least every 0.5 s; true ends the wait.
+        besides: Runs and epochs that do not count.
 
     Returns:
         Its run's name and its epoch; the newest epoch where several are seen.
@@ -255,8 +262,9 @@ def discover(
     with link.watching(ANY_LEARNER, inbox):
         while True:
             note_learners(alive, inbox, min(_SLICE_S, max(end_s - time.monotonic(), 0.0)))
-            if alive:
-                return max(alive, key=lambda learner: learner[1])
+            fresh = alive.difference(besides)
+            if fresh:
+                return max(fresh, key=lambda learner: learner[1])
             if cancelled is not None and cancelled():
                 raise LinkError(f"stopped waiting for a learner at {link.endpoint}")
             if time.monotonic() >= end_s:

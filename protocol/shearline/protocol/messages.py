@@ -16,12 +16,15 @@ from msgspec import Meta
 #: Spoken by both sides; a hello with another number is refused.
 VERSION = 1
 
+#: Longest sentence a message carries.
+TEXT_CHARS_MAX = 2048
+
 # Names and tokens stand in keys, so they are plain; `$` alone would admit a final line feed.
 Name = Annotated[
     str, Meta(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$(?!\n)")
 ]
 Token = Annotated[str, Meta(min_length=8, max_length=64, pattern=r"^[A-Za-z0-9_-]*$(?!\n)")]
-Text = Annotated[str, Meta(max_length=2048)]
+Text = Annotated[str, Meta(max_length=TEXT_CHARS_MAX)]
 Count = Annotated[int, Meta(ge=0, le=2**62)]
 Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 Seconds = Annotated[float, Meta(ge=0.0)]
@@ -348,6 +351,11 @@ class Wire(Message, frozen=True, kw_only=True, tag="wire"):
     key: Text
     payload: bytes
     at_s: Seconds
+
+
+def clip(text: str, chars: int = TEXT_CHARS_MAX) -> str:
+    """Return text that any message may carry: no lone surrogates, not too long."""
+    return text.encode("utf-8", "replace").decode()[:chars]
 
 
 def digest(task: TaskSpec) -> str:

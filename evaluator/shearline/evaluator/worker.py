@@ -1,0 +1,317 @@
+"""The evaluator process: this thread runs trials, the postman's thread speaks to the learner.
+
+Trials run on the main thread, so that signals reach it and simulators that insist on the main
+thread get it. The worker never forks and never waits for ever: whoever asked it to leave sees it
+gone within a few seconds, if need be by ``os._exit``. It does not know how trials are chosen.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import platform
+import re
+import secrets
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from shearline.evaluator.builtin import builtin_task
+from shearline.evaluator.local import Verdict, run_trial, trace_data
+from shearline.evaluator.mail import Beat, Ended, Prepare, Ready, Run, Started
+from shearline.evaluator.mailbox import RENEW_LEASES, Mailbox
+from shearline.evaluator.postman import End, Exchange, Postman
+from shearline.evaluator.task import Task, TrialAborted
+from shearline.evaluator.tasks import FunctionTask
+from shearline.protocol.errors import ConfigError, LinkError
+from shearline.protocol.keys import Keys, check_name
+from shearline.protocol.link import discover, open_client
+from shearline.protocol.messages import (
+    VERSION,
+    Hello,
+    OutcomeKind,
+    Result,
+    TaskSpec,
+    Trial,
+    clip,
+    digest,
+)
+
+log = logging.getLogger(__name__)
+
+#: How long the trial's thread may take to hear that it is over [s].
+FAREWELL_S = 0.3
+
+#: Longest wait for a session to close [s].
+CLOSE_S = 0.5
+
+#: Lets the postman speak while a trial computes in Python: its answers come within .5 ms instead
+#: of Python's 5 ms [s].
+SWITCH_S = 0.0005
+
+
+class TrialStopped(TrialAborted):
+    """The worker has to leave, or the trial took too long; raised by ``beat``."""
+
+
+def default_name() -> str:
+    """Return a name that no other evaluator has: this machine's and this process's."""
+    host = re.sub(r"[^A-Za-z0-9-]+", "-", platform.node().split(".")[0]).strip("-") or "host"
+    return f"{host[:48]}-{os.getpid()}"
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerConfig:
+    """How an evaluator takes part.
+
+    Attributes:
+        connect: The learner's endpoint, e.g. ``"tcp/192.168.1.5:7447"``.
+        name: Unique among the evaluators of a run.
+        credits: Attempts held at once: 2 for simulators (one runs, one waits), 1 for a robot.
+        kind: ``"simulator"``, ``"function"``, ``"robot"``, or ``""`` to tell by the task.
+        wait_s: How long to wait for a learner at the start [s], ``None`` for ever.
+        forever: Wait for the next run when one ends.
+        traces: Offer each trial's trace to observers.
+        settings: Further Zenoh settings by path (TLS).
+    """
+
+    connect: str
+    name: str = field(default_factory=default_name)
+    credits: int = 2
+    kind: str = ""
+    wait_s: float | None = 10.0
+    forever: bool = False
+    traces: bool = True
+    settings: Mapping[str, object] = field(default_factory=dict)
+
+
+def run_worker(
+    config: WorkerConfig,
+    task: Task | None = None,
+    *,
+    hard_exit: Callable[[int], object] = os._exit,
+) -> End:
+    """Take part until the run ends, a signal comes, or something is wrong.
+
+    Args:
+        config: How.
+        task: What to run; ``None`` takes the built-in task that the learner names.
+        hard_exit: Ends the process when a trial neither returns nor beats.
+
+    Returns:
+        Exit code (0 run ended, 2 task unusable, 3 no learner, 4 refused or hung, 130 interrupted)
+        and one sentence. The caller should end the process with ``os._exit``.
+
+    Raises:
+        ConfigError: If the evaluator's name cannot stand in a key.
+    """
+    return Worker(config, task, hard_exit).run()
+
+
+class Worker:
+    """One evaluator; see :func:`run_worker`."""
+
+    def __init__(
+        self, config: WorkerConfig, task: Task | None, hard_exit: Callable[[int], object]
+    ) -> None:
+        check_name(config.name, "evaluator name")
+        self.exchange = Exchange()
+        self._config = config
+        self._task = task
+        self._takes_task = task is None
+        self._hard_exit = hard_exit
+        self._boot = secrets.token_hex(8)
+        self._engine = ""
+        self._warm = False
+        self._over: set[tuple[str, int]] = set()
+        self._parted = threading.Event()
+        self._beat_s = 0.0
+        self._deadline_s = 0.0
+
+    def run(self) -> End:
+        """Run trials until the end."""
+        network = threading.Thread(target=self._network, daemon=True, name="postman")
+        with _signals(self.exchange), _switching():
+            network.start()
+            if self._task is not None:
+                self._prepare(self._task)
+            while True:
+                job = self.exchange.jobs.get()
+                match job:
+                    case Run(trial):
+                        self._try(trial)
+                    case Prepare(task):
+                        self._take(task)
+                    case End():
+                        self._parted.set()
+                        network.join(FAREWELL_S)
+                        return job
+
+    # -- the trial's thread ------------------------------------------------------------------
+
+    def _prepare(self, task: Task) -> None:
+        """Warm a task, then say so."""
+        try:
+            task.warm()
+            self._engine = clip(task.engine)
+        except ConfigError as fault:
+            self.exchange.leave(2, str(fault))
+        except Exception as fault:
+            log.debug("warming failed", exc_info=True)
+            why = f"task {task.spec.name} cannot start here: {type(fault).__name__}: {fault}"
+            self.exchange.leave(4, why)
+        else:
+            self._task, self._warm = task, True
+            self.exchange.inbox.put(Ready(self._engine, digest(task.spec)))
+
+    def _take(self, spec: TaskSpec) -> None:
+        """Take the learner's task, if it is a built-in that means the same here."""
+        if self._task is not None and digest(self._task.spec) == digest(spec):
+            self.exchange.inbox.put(Ready(self._engine, digest(spec)))
+            return
+        try:
+            task = builtin_task(spec.name)
+        except ConfigError:
+            self.exchange.leave(
+                2, f"the run learns {spec.name!r}, which is no built-in: name it with --task"
+            )
+            return
+        if digest(task.spec) != digest(spec):
+            why = f"the learner's {spec.name!r} has other bounds or options than the one here"
+            self.exchange.leave(4, f"{why}: install the same Shearline on both sides")
+            return
+        self._prepare(task)
+
+    def _try(self, trial: Trial) -> None:
+        """Run one attempt and report how it ended."""
+        exchange = self.exchange
+        exchange.gate.wait()
+        assert self._task is not None
+        if exchange.abort_why:
+            verdict = Verdict(OutcomeKind.ABORTED, why=f"not begun: {exchange.abort_why}")
+        else:
+            exchange.inbox.put(Started(trial.token))
+            self._deadline_s = time.monotonic() + trial.deadline_s
+            verdict = run_trial(self._task, trial.theta, trial.seed, self._beat)
+        exchange.inbox.put(Ended(self._result(trial, verdict)))
+        log.info("trial %d: %s %.6g %s", trial.trial, verdict.kind, verdict.cost, verdict.why)
+        if self._config.traces and verdict.trace is not None:
+            try:
+                exchange.inbox.put(trace_data(verdict.trace, trial.trial, trial.token))
+            except ValueError as fault:
+                log.warning("the trace of trial %d is malformed: %s", trial.trial, fault)
+
+    def _beat(self) -> None:
+        """Renew the leases now and then; end the trial if it has to end."""
+        if self.exchange.abort_why:
+            raise TrialStopped(self.exchange.abort_why)
+        now_s = time.monotonic()
+        if now_s > self._deadline_s:
+            raise TrialStopped("ran longer than its deadline")
+        if now_s >= self._beat_s:
+            self._beat_s = now_s + RENEW_LEASES * self.exchange.lease_s
+            self.exchange.inbox.put(Beat())
+
+    def _result(self, trial: Trial, verdict: Verdict) -> Result:
+        return Result(
+            boot=self._boot,
+            token=trial.token,
+            trial=trial.trial,
+            kind=verdict.kind,
+            cost=verdict.cost,
+            seed=trial.seed,
+            engine=self._engine,
+            digest=verdict.digest,
+            wall_s=verdict.wall_s,
+            why=clip(verdict.why),
+            extras=dict(verdict.extras),
+        )
+
+    # -- the postman's thread ------------------------------------------------------------------
+
+    def _network(self) -> None:
+        """Serve runs, then see that the trial's thread hears of the end or the process ends."""
+        try:
+            end = self._serve()
+            while end.code == 0 and self._config.forever and not self.exchange.is_leaving():
+                log.info("%s; waiting for the next run", end.why)
+                end = self._serve()
+        except LinkError as fault:
+            end = End(3, str(fault))
+        except Exception:
+            log.exception("the postman failed")
+            end = End(4, "this evaluator failed: its log says how")
+        leaving = self.exchange.leaving
+        if leaving is not None:
+            end = End(leaving.code, leaving.why)
+        self.exchange.abort(end.why)
+        self.exchange.jobs.put(end)
+        if not self._parted.wait(FAREWELL_S):
+            log.warning("%s; the trial does not come back, so the process ends", end.why)
+            self._hard_exit(end.code)
+
+    def _serve(self) -> End:
+        """Take part in one run, from finding its learner to its end."""
+        config, exchange = self._config, self.exchange
+        exchange.renew()
+        wait_s = None if self._over else config.wait_s
+        link = open_client(
+            config.connect, wait_s, cancelled=exchange.is_leaving, settings=config.settings
+        )
+        try:
+            run, epoch = discover(link, wait_s, cancelled=exchange.is_leaving, besides=self._over)
+            log.info("connected to %s, run %s", config.connect, run)
+            mailbox = self._mailbox()
+            end = Postman(exchange, link, Keys(run), config.name, mailbox).serve(epoch)
+            self._over.add((run, mailbox.epoch or epoch))
+            return end
+        finally:
+            link.close(CLOSE_S)
+
+    def _mailbox(self) -> Mailbox:
+        own = None if self._takes_task else self._task
+        function = isinstance(own, FunctionTask)
+        hello = Hello(
+            boot=self._boot,
+            version=VERSION,
+            task_digest="" if own is None else digest(own.spec),
+            kind=self._config.kind or ("function" if function else "simulator"),
+            engine=self._engine,
+            credits=self._config.credits,
+        )
+        warm = self._warm and own is not None
+        return Mailbox(hello, takes_task=own is None, pulses=function, warm=warm)
+
+
+@contextlib.contextmanager
+def _signals(exchange: Exchange) -> Iterator[None]:
+    """Leave on the first SIGINT or SIGTERM, at once on the second."""
+
+    def leave(number: int, _frame: object) -> None:
+        if exchange.is_leaving():
+            os._exit(130)
+        exchange.leave(130, f"interrupted by {signal.Signals(number).name}")
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {n: signal.signal(n, leave) for n in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def _switching() -> Iterator[None]:
+    before_s = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_S)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before_s)
