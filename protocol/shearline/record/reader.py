@@ -265,19 +265,8 @@ def _fetch(place: _Place) -> TraceData:
 
 
 def to_trace(trace: TraceData) -> Trace:
-    """Give the columns of a trace their shape and names.
-
-    Raises:
-        RecordError: If its bytes do not fit its columns.
-    """
-    shape = (len(trace.names), trace.samples)
-    try:
-        values = np.frombuffer(trace.data, dtype="<f4").reshape(shape)
-    except ValueError:
-        raise RecordError(
-            f"the trace of trial {trace.trial} has {len(trace.data)} bytes for {shape[0]} columns"
-            f" of {shape[1]} samples: it was written wrongly"
-        ) from None
+    """Give the columns of a trace, which fit together, their shape and names."""
+    values = np.frombuffer(trace.data, dtype="<f4").reshape(len(trace.names), trace.samples)
     named = zip(trace.names, trace.units, values, strict=True)
     return Trace(
         trial=trace.trial,

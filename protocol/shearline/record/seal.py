@@ -7,11 +7,12 @@ summary that is missing. Nothing that can be read is ever changed.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import struct
 import zlib
-from collections import defaultdict
+from collections import Counter
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -78,7 +79,9 @@ class _Survey:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     chunks: list[ChunkIndex] = field(default_factory=list)
-    counts: dict[int, int] = field(default_factory=lambda: defaultdict(int))
+    counts: Counter[int] = field(default_factory=Counter)
+    last: frozenset[int] = frozenset()  # channels of the last chunk that could be read
+    readable: bool = False  # whether the chunk just seen could be
 
 
 def _survey(file: BinaryIO) -> _Survey:
@@ -92,27 +95,36 @@ def _survey(file: BinaryIO) -> _Survey:
         survey.whole = file.read(len(MAGIC)) == MAGIC
     except RecordError:
         survey.whole = False
+        _drop_half_an_index(survey)
     return survey
 
 
 def _note(survey: _Survey, frame: Frame) -> None:
     if frame.opcode == Opcode.CHUNK:
-        _note_chunk(survey, frame)
-    elif frame.opcode == Opcode.MESSAGE_INDEX and survey.chunks:
+        survey.readable = False
+        # a damaged chunk stays where it is, outside the index: what follows it is kept
+        with contextlib.suppress(RecordError):
+            _note_chunk(survey, frame)
+            survey.readable = True
+    elif frame.opcode == Opcode.MESSAGE_INDEX and survey.readable:
         index = MessageIndex.read(ReadDataStream(BytesIO(frame.payload)))
         chunk = survey.chunks[-1]
         chunk.message_index_offsets[index.channel_id] = frame.offset
         chunk.message_index_length += frame.end - frame.offset
-        survey.counts[index.channel_id] += len(index.records)
     survey.end = frame.end
 
 
 def _note_chunk(survey: _Survey, frame: Frame) -> None:
+    found: Counter[int] = Counter()
     for record in records_of(frame):
         if isinstance(record, Schema):
             survey.schemas[record.id] = record
         elif isinstance(record, Channel):
             survey.channels[record.id] = record
+        else:
+            found[record.channel_id] += 1
+    survey.counts += found
+    survey.last = frozenset(found)
     chunk = chunk_of(frame)
     survey.chunks.append(
         ChunkIndex(
@@ -127,6 +139,15 @@ def _note_chunk(survey: _Survey, frame: Frame) -> None:
             uncompressed_size=chunk.uncompressed_size,
         )
     )
+
+
+def _drop_half_an_index(survey: _Survey) -> None:
+    """Drop the index of the last chunk if it is cut: a reader would trust what is left of it."""
+    if survey.readable and set(survey.chunks[-1].message_index_offsets) != survey.last:
+        chunk = survey.chunks[-1]
+        chunk.message_index_offsets.clear()
+        chunk.message_index_length = 0
+        survey.end = chunk.chunk_start_offset + chunk.chunk_length
 
 
 def _tail(survey: _Survey) -> bytes:
