@@ -24,6 +24,7 @@ from shearline.learner.errors import LearnerError
 from shearline.learner.inbox import Inbox
 from shearline.learner.seeds import trial_seed
 from shearline.protocol.errors import ShearlineError
+from shearline.protocol.messages import clip
 
 #: Proposals this close to the journal's are the same ones; linear algebra may differ in last bits.
 _SAME = 1e-9
@@ -83,7 +84,7 @@ class Fitter:
                 job(learner)
         except Exception as fault:  # noqa: BLE001 - whatever a learner raises must end the run, not a thread
             why = str(fault) if isinstance(fault, ShearlineError) else repr(fault)
-            self._inbox.put(LearnerFailed(f"the learner failed: {why}"[:2000]))
+            self._inbox.put(LearnerFailed(clip(f"the learner failed: {why}")))
             self._inbox.put(Recommended(None))
 
     def _ask(self, learner: Learner, ask: Ask) -> None:
@@ -92,6 +93,8 @@ class Fitter:
         first = ask.episode * ask.trials
         if [p.trial for p in proposals] != list(range(first, first + ask.trials)):
             raise LearnerError(f"expected trials from {first} on, got other numbers")
+        if not all(learner.space.contains(p.theta) for p in proposals):
+            raise LearnerError(f"a proposal of episode {ask.episode} is out of bounds")
         planned = [
             Planned(p.trial, p.theta.tolist(), trial_seed(self._seed, p.trial)) for p in proposals
         ]

@@ -32,12 +32,10 @@ def hello(desk: Desk, event: HelloReceived) -> None:
     known = desk.roster.get(name)
     if known is not None and known.boot == message.boot:
         if not known.left:
-            heard(desk, known)
-            _welcome(desk, known)
-            remind(desk, known)
+            _again(desk, known, message)
         return
     if desk.state in {RunState.STOPPING, RunState.ENDED}:
-        desk.send(name, Command(kind=CommandKind.STOP, why="the run is ending"))
+        desk.send(name, Refused(boot=message.boot, why="the run is ending", ended=True))
         return
     why = _objection(desk, message)
     if not why and known is not None and _is_alive(desk, known):
@@ -107,6 +105,19 @@ _REMINDERS = {
     RunState.STOPPING: CommandKind.STOP,
     RunState.ENDED: CommandKind.STOP,
 }
+
+
+def _again(desk: Desk, known: Evaluator, message: Hello) -> None:
+    """A boot that is known says hello again: it missed the answer, or its task is warm now."""
+    heard(desk, known)
+    why = _objection(desk, message)
+    if why:
+        known.credits = 0
+        desk.send(known.name, Refused(boot=message.boot, why=why))
+        return
+    known.engine = message.engine or known.engine
+    _welcome(desk, known)
+    remind(desk, known)
 
 
 def _objection(desk: Desk, message: Hello) -> str:

@@ -85,7 +85,7 @@ class Tally:
         late: Trials whose outcome came after they had been lost or left.
         lost: Trials without an outcome that are no longer waited for.
         surplus: Results of second attempts at trials that had their outcome.
-        aborted: Aborted attempts.
+        aborted: Aborted attempts, except those that our own stop aborted.
         rejected: Rejected attempts.
     """
 
@@ -272,14 +272,15 @@ class Book:
         self.untold.append(Told(trial.number, result.cost, result.kind is OutcomeKind.SUCCESS))
 
     def _note(self, trial: TrialRow, attempt: AttemptRow, entry: ResultTaken) -> None:
+        if entry.excused:
+            return
         if entry.result.kind is OutcomeKind.ABORTED:
             self.tally.aborted += 1
         else:
             self.tally.rejected += 1
-        if not entry.excused:
-            trial.aborts += 1
-            trial.failed_on.append(attempt.evaluator)
-            trial.why = f"{entry.result.kind} by {attempt.evaluator}: {entry.result.why}"
+        trial.aborts += 1
+        trial.failed_on.append(attempt.evaluator)
+        trial.why = f"{entry.result.kind} by {attempt.evaluator}: {entry.result.why}"
 
 
 def _attempt_cause(entry: ResultTaken) -> AttemptCause:

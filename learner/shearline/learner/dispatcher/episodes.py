@@ -26,6 +26,7 @@ from shearline.protocol.messages import (
     CommandKind,
     EpisodeClosed,
     OutcomeKind,
+    clip,
 )
 
 
@@ -96,8 +97,8 @@ def dismiss(desk: Desk, ending: Ending, why: str) -> None:
 
 def _fail(desk: Desk, why: str) -> None:
     """End the run for good: going on would only repeat it."""
-    desk.journal(RunEnded(at_s=desk.now_s, stimulus=desk.stimulus, ok=False, why=why[:2048]))
-    dismiss(desk, Ending.FAILED, why[:2048])
+    desk.journal(RunEnded(at_s=desk.now_s, stimulus=desk.stimulus, ok=False, why=clip(why)))
+    dismiss(desk, Ending.FAILED, clip(why))
 
 
 def _is_exhausted(desk: Desk, trial: TrialRow) -> bool:
@@ -112,7 +113,7 @@ def _is_exhausted(desk: Desk, trial: TrialRow) -> bool:
 def _lose(desk: Desk, trial: TrialRow) -> None:
     why = f"given up after {trial.attempts} attempts; the last: {trial.why}"
     desk.journal(
-        TrialLost(at_s=desk.now_s, stimulus=desk.stimulus, trial=trial.number, why=why[:2048])
+        TrialLost(at_s=desk.now_s, stimulus=desk.stimulus, trial=trial.number, why=clip(why))
     )
     desk.say(f"trial {trial.number} is lost: {why}")
 
