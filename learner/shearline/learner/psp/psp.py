@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from shearline.learner.episodic import EpisodicLearner
 from shearline.learner.ledger import Trials
 from shearline.learner.lhs import latin_hypercube
 from shearline.learner.psp.config import Exhausted, PSPConfig
+from shearline.learner.psp.focus import component_focus
 from shearline.learner.psp.model import Model, renew
 from shearline.learner.psp.partition import Partition
 from shearline.learner.psp.proposal import draw_inside
@@ -40,6 +41,8 @@ class PSP(EpisodicLearner):
     ) -> None:
         super().__init__(space, episode_length, seed)
         self.config = config
+        # A look ahead for the recommendation needs no filter, which is the costly part.
+        self._without_filter = replace(config, filter_min=2**62)
         self.name = name
         self._design: Array | None = None
         self._belief = Model(self._ledger.trials(), np.zeros(0, dtype=np.bool_))
@@ -49,10 +52,7 @@ class PSP(EpisodicLearner):
             self._design = latin_hypercube(rng, self.episode_length, len(self.space))
             return
         self._design = None
-        self._belief = self._renewed(trials)
-
-    def _renewed(self, trials: Trials) -> Model:
-        return renew(self._belief, trials, self.seed % 2**32, self.config)
+        self._belief = renew(self._belief, trials, self.seed % 2**32, self.config)
 
     def _draw(self, index: int, rng: np.random.Generator) -> Array:
         if self._design is not None:
@@ -81,20 +81,9 @@ class PSP(EpisodicLearner):
         return np.array(best)
 
     def _focus(self, trials: Trials) -> Focus:
-        """Return the component of the mixture, as the next episode would have it, that pays best.
-
-        That is the one whose good samples have the least expected cost.
-        """
-        model = self._renewed(trials)
-        if model.mixture is None or not model.good.any():
-            return super()._focus(trials)
-        good = model.trials.where(model.good)
-        component = model.mixture.nearest(good.u)
-        counts = np.bincount(component, minlength=len(model.mixture.weights))
-        sums = np.bincount(component, weights=good.cost, minlength=len(counts))
-        costs = np.where(counts > 0, sums / np.maximum(counts, 1), math.inf)
-        best = int(np.argmin(costs))
-        return Focus(model.mixture.means[best], model.mixture.deviations[best])
+        """Return the best component of the mixture that the next episode would draw from."""
+        mixture = renew(self._belief, trials, self.seed % 2**32, self._without_filter).mixture
+        return super()._focus(trials) if mixture is None else component_focus(mixture, trials)
 
     def _model(self) -> Mapping[str, object]:
         belief = self._belief

@@ -1,0 +1,42 @@
+"""Which of the mixture's components PSP would stay with if it had to choose one tuple now."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from shearline.learner.ledger import Trials
+from shearline.learner.psp.proposal import Mixture
+from shearline.learner.recommend import ON_POLICY_TRIALS, Focus, clopper_pearson_low
+
+
+def component_focus(mixture: Mixture, trials: Trials) -> Focus:
+    """Return the component whose latest trials promise the least cost, judged pessimistically.
+
+    A component answers for the recent trials that lie in it. It is judged by the cost to be
+    expected at the *lower bound* of its success probability, so that neither one lucky trial nor
+    a cheap fragile corner wins against a component that was tried often and held.
+
+    Args:
+        mixture: The proposal policy.
+        trials: Everything told, with raw costs.
+    """
+    recent = trials.last(ON_POLICY_TRIALS)
+    owner = mixture.nearest(recent.u)
+    won = recent.cost[recent.success]
+    failure_cost = 2.0 * float(won.max()) - float(won.min()) if len(won) else math.inf
+    promises = [
+        _promise(recent.where(owner == k), failure_cost) for k in range(len(mixture.weights))
+    ]
+    best = int(np.argmin(promises))
+    return Focus(mixture.means[best], mixture.deviations[best])
+
+
+def _promise(trials: Trials, failure_cost: float) -> float:
+    """Return the expected cost of one trial at the lower bound of the success probability."""
+    wins = int(trials.success.sum())
+    if wins == 0:
+        return failure_cost
+    low = clopper_pearson_low(wins, len(trials))
+    return low * float(trials.cost[trials.success].mean()) + (1.0 - low) * failure_cost
