@@ -21,10 +21,10 @@ from shearline.evaluator.postman import End
 from shearline.evaluator.task import Array, Outcome, Task, Trace, TrialAborted
 from shearline.evaluator.tasks import FunctionTask
 from shearline.evaluator.tasks import task as declare
-from shearline.evaluator.worker import WorkerConfig, default_name, run_worker
+from shearline.evaluator.worker import Worker, WorkerConfig, default_name, run_worker
 from shearline.protocol.codec import BY_TOPIC, decode, encode
 from shearline.protocol.errors import ConfigError
-from shearline.protocol.keys import Keys, check_name, parse
+from shearline.protocol.keys import Address, Keys, check_name, parse
 from shearline.protocol.link import Link, Presence, free_endpoint, open_router
 from shearline.protocol.messages import (
     Ack,
@@ -69,8 +69,10 @@ class TinyLearner:
         self.inbox: SimpleQueue[Any] = SimpleQueue()
         self.link: Link = open_router(self.endpoint)
         self.keys = Keys(self.run)
-        for pattern in (*self.keys.from_evaluators(), self.keys.observed()):
+        self.traces: SimpleQueue[Any] = SimpleQueue()
+        for pattern in self.keys.from_evaluators():
             self.link.subscribe(pattern, self.inbox)
+        self.link.subscribe(self.keys.observed(), self.traces)
         self.link.watch(self.keys.live_evaluators(), self.inbox)
         self.link.announce(self.keys.live_learner(self.epoch))
         return self
@@ -88,8 +90,7 @@ class TinyLearner:
             item = self.inbox.get(timeout=max(0.01, end_s - time.monotonic()))
             if isinstance(item, Presence):
                 continue
-            topic = parse(item.key).topic
-            message = decode(item.payload, *BY_TOPIC.get(topic, (TraceData,)))
+            message = decode(item.payload, *BY_TOPIC[parse(item.key).topic])
             self.heard.append(message)
             if isinstance(message, kind) and where(message):
                 return message
@@ -154,14 +155,16 @@ class Running:
 def working(endpoint: str, task: Task | None = BOWL, **changes: Any) -> Iterator[Running]:
     config = WorkerConfig(connect=endpoint, name=NAME, **changes)
     running = Running()
-
-    def work() -> None:
-        running.ends.put(run_worker(config, task, hard_exit=running.exits.put))
-
-    thread = threading.Thread(target=work, daemon=True)
+    worker = Worker(config, task, running.exits.put)
+    thread = threading.Thread(target=lambda: running.ends.put(worker.run()), daemon=True)
     thread.start()
-    yield running
-    thread.join(WAIT_S)
+    try:
+        yield running
+    except BaseException:
+        worker.exchange.leave(130, "the test failed")
+        raise
+    finally:
+        thread.join(WAIT_S)
 
 
 @pytest.fixture
@@ -368,7 +371,9 @@ def test_a_trace_is_offered_to_observers(learner: TinyLearner) -> None:
         hello = learner.ready()
         trial = learner.give(hello, 1, [2.0, 0.0])
         learner.take()
-        trace = learner.next(TraceData)
+        arrival = learner.traces.get(timeout=WAIT_S)
+        assert parse(arrival.key) == Address("run-1", "obs/trace", NAME)
+        trace = decode(arrival.payload, TraceData)
         assert (trace.trial, trace.token) == (1, trial.token)
         assert (trace.names, trace.units) == (["t_s", "tip.x"], ["s", "m"])
         columns = np.frombuffer(trace.data, "<f4").reshape(2, trace.samples)

@@ -116,6 +116,28 @@ def test_one_evaluator_does_not_hear_what_is_said_to_another(router: Link, clien
     assert inbox.get(timeout=WAIT_S) == Arrival(f"{KEYS.root}/ev/lab/trial", b"yours")
 
 
+def test_nobody_hears_himself(router: Link, client: Link) -> None:
+    for link in (router, client):
+        inbox: SimpleQueue[Any] = SimpleQueue()
+        other = client if link is router else router
+        link.subscribe(f"{KEYS.root}/ev/*/*", inbox)
+        _until_heard(other, inbox, f"{KEYS.root}/ev/lab/ack")
+        link.publish(f"{KEYS.root}/ev/lab/ack", b"own")
+        other.publish(f"{KEYS.root}/ev/lab/ack", b"theirs")
+        assert inbox.get(timeout=WAIT_S).payload == b"theirs"
+        assert inbox.empty()
+
+
+def test_observers_lose_nothing_while_they_keep_up(router: Link, client: Link) -> None:
+    inbox: SimpleQueue[Any] = SimpleQueue()
+    key = f"{KEYS.root}/obs/trace/lab"
+    router.subscribe(key, inbox)
+    _until_heard(client, inbox, key)
+    for size in (10, 10_000, 300_000, 10):
+        client.observe(key, bytes(size))
+        assert len(inbox.get(timeout=WAIT_S).payload) == size
+
+
 def test_a_message_beyond_the_limit_vanishes_and_the_link_stays(router: Link, client: Link) -> None:
     inbox: SimpleQueue[Any] = SimpleQueue()
     key = f"{KEYS.root}/obs/trace/lab"

@@ -110,13 +110,16 @@ class Keys:
         return f"{self.root}/live/learner/{epoch}"
 
     def from_evaluators(self) -> tuple[str, ...]:
-        """Return the patterns that the learner listens to."""
-        return tuple(f"{self.root}/ev/*/{said}" for said in UP_TOPICS)
+        """Return the patterns that the learner listens to.
+
+        One pattern for all topics: what comes on one subscription comes in order, while two may
+        overtake each other.
+        """
+        return (f"{self.root}/ev/*/*",)
 
     def to_evaluator(self, evaluator: str) -> tuple[str, ...]:
         """Return the patterns that one evaluator listens to."""
-        own = tuple(f"{self.root}/ev/{evaluator}/{said}" for said in DOWN_TOPICS)
-        return (*own, self.all_cmd())
+        return (f"{self.root}/ev/{evaluator}/*", self.all_cmd())
 
     def observed(self) -> str:
         """Return the pattern of everything an observer may hear."""
