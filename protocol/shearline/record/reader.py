@@ -29,7 +29,7 @@ from shearline.protocol.messages import (
     Snapshot,
     TraceData,
 )
-from shearline.record.frames import Frame, frame_at, frames, records_of
+from shearline.record.frames import Frame, chunks_in, frame_at, frames, records_of
 from shearline.record.parts import is_live, parts
 from shearline.record.schemas import Decoder
 from shearline.record.topics import TOPICS, RunConfig
@@ -204,16 +204,18 @@ def _hold(run: Run, found: _Found) -> None:
 def _scan(path: Path, topics: frozenset[str], damage: list[str]) -> Iterator[_Found]:
     """Yield the messages of some topics in one part, noting damage instead of raising."""
     part = _Part(path, topics)
+    chunks = 0
     with path.open("rb") as file:
         try:
             for frame in frames(file):
                 if frame.opcode == Opcode.CHUNK:
+                    chunks += 1
                     yield from _chunk(part, frame, damage)
-                elif frame.opcode == Opcode.DATA_END:
-                    return
+                elif frame.opcode == Opcode.STATISTICS and chunks_in(frame) > chunks:
+                    damage.append(f"{path.name}: a chunk cannot be found; all else was read")
         except RecordError as error:
             if not is_live(path):
-                damage.append(f"{path.name}: {error}; all before that was read")
+                damage.append(f"{path.name}: {error}; all else before that was read")
 
 
 def _chunk(part: _Part, frame: Frame, damage: list[str]) -> Iterator[_Found]:
