@@ -37,6 +37,6 @@ def _promise(trials: Trials, failure_cost: float) -> float:
     """Return the expected cost of one trial at the lower bound of the success probability."""
     wins = int(trials.success.sum())
     if wins == 0:
-        return failure_cost
+        return math.inf
     low = clopper_pearson_low(wins, len(trials))
     return low * float(trials.cost[trials.success].mean()) + (1.0 - low) * failure_cost
