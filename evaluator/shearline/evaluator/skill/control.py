@@ -2,7 +2,7 @@
 
 tau = J^T (K e + D de + F) + N^T tau_n + bias, with torque and torque-rate limits of the arm
 (Hogan 1985; Ott 2008). It receives commands and percepts, returns torques, and knows neither
-phases nor plants nor parameters other than the damping ratio.
+phases nor plants nor parameters.
 
 The external torque is a first-order low-pass of the torques with which the surroundings act on the
 joints, as a momentum observer with an exact model would give it. Its band is part of the task:
@@ -70,6 +70,7 @@ class Feel(NamedTuple):
         tau_ext: External torque, low-passed ``(7,)`` [N m].
         wrench: External force and torque on the tip in the frame of the believed lock ``(6,)``.
         tip: Tip in the frame of the believed lock ``(3,)`` [m].
+        speed: Of the tip, translation and rotation, in that frame ``(6,)`` [m/s, rad/s].
         jacobian: In the frame of the believed lock ``(6, 7)``.
         factor: Cholesky factor of J J^T ``(6, 6)``.
     """
@@ -78,6 +79,7 @@ class Feel(NamedTuple):
     tau_ext: Array
     wrench: Array
     tip: Array
+    speed: Array
     jacobian: Array
     factor: Array
 
@@ -103,6 +105,7 @@ def empty_feel() -> Feel:
         tau_ext=np.zeros(JOINTS),
         wrench=np.zeros(6),
         tip=np.zeros(3),
+        speed=np.zeros(6),
         jacobian=np.zeros((6, JOINTS)),
         factor=np.zeros((6, 6)),
     )
@@ -124,24 +127,24 @@ def feel(f: Feel, percept: Percept, arm: Arm) -> None:
             f.jacobian[3 + i, j] = rotation
     for j in range(JOINTS):
         f.tau_ext[j] += arm.smoothing * (percept.contact[j] - f.tau_ext[j])
+    _times_jacobian(f, percept.dq, f.speed)
     _factor(f)
     _times_jacobian(f, f.tau_ext, f.wrench)
     _solve(f, f.wrench)
 
 
 @compiled
-def control(f: Feel, percept: Percept, c: Command, xi: float, arm: Arm) -> None:
+def control(f: Feel, percept: Percept, c: Command, arm: Arm) -> None:
     """Compute the torques ``f.tau`` of this tick.
 
     Args:
         f: Up to date, see :func:`feel`.
         percept: The present.
         c: What to do.
-        xi: Damping ratio.
         arm: Constants.
     """
     wrench = np.empty(6)
-    _impedance(f, percept, c, xi, arm, wrench)
+    _impedance(f, percept, c, arm, wrench)
     rest = np.empty(JOINTS)
     for j in range(JOINTS):
         rest[j] = NULLSPACE_K * (arm.q_rest[j] - percept.q[j]) - NULLSPACE_D * percept.dq[j]
@@ -156,21 +159,18 @@ def control(f: Feel, percept: Percept, c: Command, xi: float, arm: Arm) -> None:
 
 
 @compiled
-def _impedance(
-    f: Feel, percept: Percept, c: Command, xi: float, arm: Arm, wrench: Array
-) -> None:
+def _impedance(f: Feel, percept: Percept, c: Command, arm: Arm, wrench: Array) -> None:
     """F = K e + D de + F_ff for each axis, with D = 2 xi sqrt(K m)."""
-    e, speed = np.empty(6), np.zeros(6)
+    e = np.empty(6)
     _turn_error(percept.rotation, arm.axes, c.turn, e)
     for i in range(3):
         e[i] = c.x[i] - f.tip[i]
     for i in range(6):
-        for j in range(JOINTS):
-            speed[i] += f.jacobian[i, j] * percept.dq[j]
-    for i in range(6):
         wanted = c.v[i] if i < 3 else c.w[i - 3]
-        damping = 2.0 * xi * math.sqrt(c.damped_as[i] * arm.mass[i])
-        wrench[i] = c.stiffness[i] * e[i] + damping * (wanted - speed[i]) + c.wrench[i]
+        damping = 2.0 * c.ratio[0] * math.sqrt(c.stiffness[i] * arm.mass[i])
+        if i < 3:
+            damping += c.drag[i]
+        wrench[i] = c.stiffness[i] * e[i] + damping * (wanted - f.speed[i]) + c.wrench[i]
 
 
 @compiled

@@ -26,17 +26,23 @@ from shearline.sims.panda import Array
 HOVER_M = 3e-3
 
 #: Duration of the approach [s].
-APPROACH_S = 0.4
+APPROACH_S = 0.8
 
-#: Stiffness of the approach: translation [N/m], rotation [N m/rad].
-APPROACH_K = 1500.0
-APPROACH_K_ROT = 150.0
+#: Stiffness of approach and extraction: translation [N/m], rotation [N m/rad].
+APPROACH_K = 3000.0
+APPROACH_K_ROT = 300.0
+
+#: Damping ratio of approach and extraction; ``xi`` is for the phases in contact.
+APPROACH_XI = 1.0
 
 #: Stiffness along the axis while seeking contact and pulling out [N/m].
 AXIAL_K = 1500.0
 
 #: The axial reference leads the tip by at most this much [m]: bounds the static force.
 LEAD_M = 15e-3
+
+#: Drag along the axis on what the key moves faster than ``ins_speed`` [N s/m].
+BRAKE = 300.0
 
 #: Speed of the extraction [m/s].
 EXTRACTION_SPEED = 0.05
@@ -51,8 +57,8 @@ class Command(NamedTuple):
         v: Speed of ``x`` ``(3,)`` [m/s].
         w: Speed of ``turn`` ``(3,)`` [rad/s].
         stiffness: Translation ``[:3]`` [N/m], rotation ``[3:]`` [N m/rad].
-        damped_as: Stiffness from which the damping is computed, as above; differs from
-            ``stiffness`` where an axis is damped but not held.
+        ratio: Damping ratio of all axes that are held ``(1,)``.
+        drag: Damping of translations on top of that ``(3,)`` [N s/m].
         wrench: Feed-forward force ``[:3]`` [N] and torque ``[3:]`` [N m]: push and wiggle.
     """
 
@@ -61,7 +67,8 @@ class Command(NamedTuple):
     v: Array
     w: Array
     stiffness: Array
-    damped_as: Array
+    ratio: Array
+    drag: Array
     wrench: Array
 
 
@@ -73,14 +80,21 @@ def empty_command() -> Command:
         v=np.zeros(3),
         w=np.zeros(3),
         stiffness=np.zeros(6),
-        damped_as=np.zeros(6),
+        ratio=np.zeros(1),
+        drag=np.zeros(3),
         wrench=np.zeros(6),
     )
 
 
 @compiled
 def command(
-    c: Command, phase: int, phase_ticks: int, tip: Array, p: Parameters, tick_s: float
+    c: Command,
+    phase: int,
+    phase_ticks: int,
+    tip: Array,
+    speed_z: float,
+    p: Parameters,
+    tick_s: float,
 ) -> None:
     """Move the command on by one tick.
 
@@ -89,18 +103,20 @@ def command(
         phase: Phase the semantic layer has decided on.
         phase_ticks: Ticks spent in it; 0 on entry.
         tip: Tip in the frame of the believed lock ``(3,)`` [m].
+        speed_z: Its speed along the axis [m/s].
         p: The tuple being tried.
         tick_s: Length of a tick [s].
     """
     c.v[:] = 0.0
     c.w[:] = 0.0
+    c.drag[:] = 0.0
     c.wrench[:] = 0.0
     if phase == APPROACH:
         _approach(c, phase_ticks * tick_s, tip, p, tick_s)
     elif phase == CONTACT:
         _contact(c, tip, p, tick_s)
     elif phase == INSERTION:
-        _insertion(c, phase_ticks * tick_s, tip, p, tick_s)
+        _insertion(c, phase_ticks * tick_s, tip, speed_z, p, tick_s)
     elif phase == EXTRACTION:
         _extraction(c, phase_ticks, tip, tick_s)
 
@@ -116,9 +132,11 @@ def _approach(c: Command, t_s: float, tip: Array, p: Parameters, tick_s: float) 
     goal = (p.app_off_x, p.app_off_y, -HOVER_M)
     tilt = (p.app_tilt_x, p.app_tilt_y, 0.0)
     for i in range(3):
-        c.x[i] += (goal[i] - c.x[i]) * step
-        c.turn[i] += (tilt[i] - c.turn[i]) * step
-    _hold(c, APPROACH_K, APPROACH_K, APPROACH_K_ROT)
+        c.v[i] = (goal[i] - c.x[i]) * step / tick_s
+        c.w[i] = (tilt[i] - c.turn[i]) * step / tick_s
+        c.x[i] += c.v[i] * tick_s
+        c.turn[i] += c.w[i] * tick_s
+    _hold(c, APPROACH_K, APPROACH_K, APPROACH_K_ROT, APPROACH_XI)
 
 
 @compiled
@@ -131,18 +149,26 @@ def _left_to_go(t_s: float) -> float:
 def _contact(c: Command, tip: Array, p: Parameters, tick_s: float) -> None:
     c.x[2] = min(c.x[2] + p.con_speed * tick_s, tip[2] + LEAD_M)
     c.v[2] = p.con_speed
-    _hold(c, p.con_k_xy, AXIAL_K, p.ins_k_rot)
+    _hold(c, p.con_k_xy, AXIAL_K, p.ins_k_rot, p.xi)
 
 
 @compiled
-def _insertion(c: Command, t_s: float, tip: Array, p: Parameters, tick_s: float) -> None:
+def _insertion(
+    c: Command, t_s: float, tip: Array, speed_z: float, p: Parameters, tick_s: float
+) -> None:
+    """Push, lead back to the axis, wiggle.
+
+    The axial force is ``ins_push`` up to the speed ``ins_speed``, and less above it: never more.
+    """
     for i in range(2):
-        c.x[i] = _toward_zero(c.x[i], p.ins_speed * tick_s)
-        c.turn[i] = _toward_zero(c.turn[i], p.ins_rotspeed * tick_s)
+        c.v[i] = _toward_zero(c.x[i], p.ins_speed, tick_s)
+        c.w[i] = _toward_zero(c.turn[i], p.ins_rotspeed, tick_s)
+        c.x[i] += c.v[i] * tick_s
+        c.turn[i] += c.w[i] * tick_s
     c.x[2] = tip[2]
     c.v[2] = p.ins_speed
-    _hold(c, p.ins_k_xy, 0.0, p.ins_k_rot)
-    c.damped_as[2] = AXIAL_K
+    c.drag[2] = BRAKE if speed_z > p.ins_speed else 0.0
+    _hold(c, p.ins_k_xy, 0.0, p.ins_k_rot, p.xi)
     turn = 2.0 * math.pi * t_s
     c.wrench[0] = p.wig_a_x * math.sin(turn * p.wig_f_x)
     c.wrench[1] = p.wig_a_y * math.sin(turn * p.wig_f_y + p.wig_phi_y)
@@ -157,17 +183,18 @@ def _extraction(c: Command, phase_ticks: int, tip: Array, tick_s: float) -> None
         c.x[:] = tip
     c.x[2] = max(c.x[2] - EXTRACTION_SPEED * tick_s, tip[2] - LEAD_M)
     c.v[2] = -EXTRACTION_SPEED
-    _hold(c, APPROACH_K / 3.0, AXIAL_K, APPROACH_K_ROT / 3.0)
+    _hold(c, APPROACH_K / 6.0, AXIAL_K, APPROACH_K_ROT / 6.0, APPROACH_XI)
 
 
 @compiled
-def _hold(c: Command, k_xy: float, k_z: float, k_rot: float) -> None:
+def _hold(c: Command, k_xy: float, k_z: float, k_rot: float, ratio: float) -> None:
     for i in range(3):
         c.stiffness[i] = k_z if i == 2 else k_xy
         c.stiffness[3 + i] = k_rot
-    c.damped_as[:] = c.stiffness
+    c.ratio[0] = ratio
 
 
 @compiled
-def _toward_zero(value: float, step: float) -> float:
-    return math.copysign(max(abs(value) - step, 0.0), value)
+def _toward_zero(value: float, speed: float, tick_s: float) -> float:
+    """Return the velocity that leads ``value`` to zero at ``speed`` and stays there."""
+    return -math.copysign(min(speed, abs(value) / tick_s), value)

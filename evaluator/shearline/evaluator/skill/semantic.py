@@ -41,7 +41,7 @@ TIME_MAX_S = 5.0
 SEARCH_MAX_S = 5.0
 
 #: The approach has arrived when its trajectory has ended this long ago [s].
-SETTLE_S = 0.05
+SETTLE_S = 0.15
 
 #: The extraction ends when the tip is this far in front of the mouth [m], or after its time [s].
 CLEAR_M = 2e-3
@@ -129,6 +129,8 @@ def decide(
 ) -> Decision:
     """Return where the skill stands after one more tick.
 
+    The region of interest counts from the contact phase on: the approach is in free space.
+
     Args:
         before: Where it stood.
         sight: What is seen now.
@@ -163,10 +165,11 @@ def _next_phase(before: Decision, sight: Sight, p: Parameters, tick_s: float) ->
 def _verdict(
     sight: Sight, tau_ext: Array, limits: Limits, clock_s: float, search_s: float, crossed: bool
 ) -> int:
+    searching = search_s > 0.0
     for j in range(tau_ext.shape[0]):
         if abs(tau_ext[j]) > limits.torque[j]:
             return TORQUE
-    if sight.x_m**2 + sight.y_m**2 > limits.roi_m**2:
+    if searching and sight.x_m**2 + sight.y_m**2 > limits.roi_m**2:
         return ROI
     if sight.depth_m >= limits.depth_m:
         return SUCCESS

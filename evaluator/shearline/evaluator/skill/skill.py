@@ -54,6 +54,6 @@ def tick(
         percept.in_lock[0], percept.in_lock[1], percept.in_lock[2], -f.wrench[2], APPROACH_S
     )
     now = decide(before, sight, f.tau_ext, p, limits, tick_s)
-    command(c, now.phase, now.phase_ticks, f.tip, p, tick_s)
-    control(f, percept, c, p.xi, arm)
+    command(c, now.phase, now.phase_ticks, f.tip, f.speed[2], p, tick_s)
+    control(f, percept, c, arm)
     return now
