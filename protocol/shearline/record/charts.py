@@ -20,6 +20,8 @@ Array = npt.NDArray[np.float64]
 WIDTH = 240.0
 HEIGHT = 100.0
 GRID_LINES = 4
+#: Below this, values are nothing to anyone, and powers of ten lose their digits.
+TINY = 1e-300
 #: More points than pixels in a row of any screen show nothing more.
 POINTS_MAX = 400
 
@@ -102,10 +104,13 @@ def telling(series: Sequence[npt.NDArray[np.float32]], n: int) -> npt.NDArray[np
     spread = np.ptp(values, axis=1, keepdims=True)
     values /= np.where(spread > 0.0, spread, 1.0)
     width = -(-(samples - 1) // (n - 1))
-    whole = (samples - 1) // width * width
-    bins = values[:, :whole].reshape(len(values), -1, width)
-    far = np.abs(bins - bins.mean(axis=2, keepdims=True)).max(axis=0).argmax(axis=1)
-    return np.append(np.arange(0, whole, width) + far, samples - 1)
+    n_bins = -(-(samples - 1) // width)
+    padding = n_bins * width - (samples - 1)
+    padded = np.pad(values[:, :-1], ((0, 0), (0, padding)), constant_values=np.nan)
+    bins = padded.reshape(len(values), n_bins, width)
+    away = np.abs(bins - np.nanmean(bins, axis=2, keepdims=True))
+    far = np.nan_to_num(away, nan=-1.0).max(axis=0).argmax(axis=1)
+    return np.append(np.arange(n_bins) * width + far, samples - 1)
 
 
 def nice_above(value: float) -> float:
@@ -123,7 +128,7 @@ def bounds(low: float, high: float) -> tuple[float, float]:
     One-sided values get one-sided bounds, others are centred on zero.
     """
     low, high = min(low, 0.0), max(high, 0.0)
-    reach = nice_above(max(high, -low)) if max(high, -low) > 0 else 1.0
+    reach = nice_above(max(high, -low)) if max(high, -low) > TINY else 1.0
     # a little noise on the other side does not make a series two-sided
     if low > -0.05 * high:
         return 0.0, reach

@@ -56,7 +56,7 @@ def save(run_dir: Path | str, path: Path | str) -> Run:
     """
     run = open_run(run_dir)
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{run.name or run.run_dir.name}")
-    stream.save(path, default_blueprint=_layout_of(run))
+    stream.save(path, default_blueprint=layout_of(run))
     draw(stream, run)
     stream.flush()
     stream.disconnect()
@@ -77,20 +77,20 @@ def view(run_dir: Path | str) -> Run:
     return run
 
 
-def draw(stream: rr.RecordingStream, run: Run) -> None:
-    """Draw everything a run has on record."""
+def draw(stream: rr.RecordingStream, run: Run) -> Picture:
+    """Draw everything a run has on record; return the picture, to be drawn on."""
     picture = Picture(stream, run.config)
-    closed = {episode.episode: episode for episode in run.episodes}
     for outcome in run.outcomes:
         picture.outcome(outcome)
     last_trial = {outcome.episode: outcome.trial for outcome in run.outcomes}
-    for number, episode in closed.items():
-        picture.episode(episode, last_trial.get(number))
+    for episode in run.episodes:
+        picture.episode(episode, last_trial.get(episode.episode))
     for state in run.evaluators:
         picture.evaluator(state)
     for trial in run.traced():
         for trace in run.traces(trial):
             picture.trace(trace)
+    return picture
 
 
 def follow(
@@ -98,6 +98,8 @@ def follow(
     stream: rr.RecordingStream,
     *,
     closed: Callable[[], bool],
+    run_dir: Path | None = None,
+    ready: Callable[[], None] = lambda: None,
     timeout_s: float = 5.0,
 ) -> None:
     """Draw a running run into a stream until it ends or ``closed`` says so.
@@ -106,6 +108,8 @@ def follow(
         connect: The learner's endpoint.
         stream: Where to draw.
         closed: Asked ten times a second.
+        run_dir: The run's folder, if it is at hand: what it has on record is drawn first.
+        ready: Called once everything said from now on will be drawn.
         timeout_s: How long to look for a learner [s].
 
     Raises:
@@ -115,15 +119,23 @@ def follow(
     with open_client(connect, timeout_s) as link:
         run, _ = discover(link, timeout_s)
         link.subscribe(Keys(run).observed(), cast("SimpleQueue[Any]", inbox))
-        live = _Live(stream)
-        while not closed() and not live.ended:
+        so_far = open_run(run_dir) if run_dir else None
+        live = _Live(stream, so_far)
+        ready()
+        while not closed():
             item = inbox.get(TICK_S)
             if item is not None:
                 live.take(item.payload)
+            elif live.ended:
+                return
 
 
-def view_live(connect: str) -> None:
-    """Show a running run in the viewer, from now on; returns when either has ended.
+def view_live(connect: str, run_dir: Path | None = None) -> None:
+    """Show a running run in the viewer; returns when the viewer is closed.
+
+    Args:
+        connect: The learner's endpoint.
+        run_dir: The run's folder, if it is at hand; else the view begins with what comes.
 
     Raises:
         LinkError: If no learner is alive at ``connect``.
@@ -133,19 +145,20 @@ def view_live(connect: str) -> None:
     stream = rr.RecordingStream(APPLICATION)
     with viewer(["--port", str(port)]) as child:
         stream.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy")
-        follow(connect, stream, closed=lambda: child.poll() is not None)
+        follow(connect, stream, closed=lambda: child.poll() is not None, run_dir=run_dir)
         child.wait()
 
 
 class _Live:
     """Draws messages as they come; what it cannot read it leaves out."""
 
-    def __init__(self, stream: rr.RecordingStream) -> None:
+    def __init__(self, stream: rr.RecordingStream, so_far: Run | None) -> None:
         self.ended = False
         self._stream = stream
-        self._picture = Picture(stream, None)
-        self._laid_out = False
-        self._stream.send_blueprint(layout_for(None, None))
+        self._config = so_far.config if so_far else None
+        self._laid_out = bool(so_far and so_far.traced())
+        self._stream.send_blueprint(layout_of(so_far) if so_far else layout_for(None, None))
+        self._picture = draw(stream, so_far) if so_far else Picture(stream, None)
 
     def take(self, payload: bytes) -> None:
         try:
@@ -168,7 +181,7 @@ class _Live:
         trace = to_trace(message)
         if not self._laid_out:
             self._laid_out = True
-            self._stream.send_blueprint(layout_for(None, trace))
+            self._stream.send_blueprint(layout_for(self._config, trace))
         self._picture.trace(trace)
 
 
@@ -187,7 +200,8 @@ def layout_for(
     )
 
 
-def _layout_of(run: Run) -> rrb.Blueprint:
+def layout_of(run: Run, *, active_tab: int = 0) -> rrb.Blueprint:
+    """Return the layout for a run, with one of its tabs in front."""
     traced = run.traced()
     first = run.traces(traced[0])[0] if traced else None
-    return layout_for(run.config, first)
+    return layout_for(run.config, first, active_tab=active_tab)

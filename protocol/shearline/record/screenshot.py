@@ -1,0 +1,113 @@
+"""Takes a picture of the view without a screen, for documentation and tests.
+
+Needs a Vulkan driver; a software one will do (Debian: mesa-vulkan-drivers, libvulkan1). Run as
+``python -m shearline.record.screenshot RUN_DIR out.png --trial 41``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import rerun as rr
+from rerun.experimental import ViewerClient
+
+from shearline.protocol.errors import RecordError
+from shearline.protocol.link import free_endpoint
+from shearline.record.reader import open_run
+from shearline.record.view import APPLICATION, draw, layout_of
+from shearline.record.viewer import quiet_environment
+
+#: A picture that has not changed for so many looks is complete ...
+STILL_LOOKS = 3
+#: ... and is looked at this long at most [s].
+PATIENCE_S = 60.0
+
+
+def screenshot(run_dir: Path | str, path: Path | str, *, trial: int = 0, tab: int = 0) -> None:
+    """Draw a run in a viewer without a window and write what it shows.
+
+    Args:
+        run_dir: The run folder.
+        path: PNG file to write.
+        trial: Trial under the cursor.
+        tab: Which tab of the layout stands in front, from 0.
+
+    Raises:
+        RecordError: If there is no such run, or no graphics driver.
+    """
+    run = open_run(run_dir)
+    with _quiet(), _headless() as client:
+        stream = rr.RecordingStream(APPLICATION, recording_id="screenshot")
+        stream.connect_grpc(client.url)
+        draw(stream, run)
+        stream.send_blueprint(layout_of(run, active_tab=tab))
+        stream.flush()
+        _settle(client)
+        client.set_time("trial", sequence=trial, play_state="paused")
+        Path(path).write_bytes(_settle(client))
+        stream.disconnect()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Take one picture as a program; return its exit code."""
+    parser = argparse.ArgumentParser(prog="shearline.record.screenshot")
+    parser.add_argument("run", type=Path, help="the run folder")
+    parser.add_argument("out", type=Path, help="PNG file to write")
+    parser.add_argument("--trial", type=int, default=0, help="trial under the cursor")
+    parser.add_argument("--tab", type=int, default=0, help="tab in front, from 0")
+    asked = parser.parse_args(arguments)
+    try:
+        screenshot(asked.run, asked.out, trial=asked.trial, tab=asked.tab)
+    except RecordError as error:
+        print(error, file=sys.stderr)  # noqa: T201 - a program's one sentence
+        return 4
+    return 0
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Let the viewer's statistics stay off for as long as the block lasts."""
+    before = dict(os.environ)
+    with quiet_environment() as environment:
+        os.environ.update(environment)
+        try:
+            yield
+        finally:
+            os.environ.clear()
+            os.environ.update(before)
+
+
+@contextmanager
+def _headless() -> Iterator[ViewerClient]:
+    port = int(free_endpoint().rsplit(":", 1)[1])
+    try:
+        client = ViewerClient.spawn(headless=True, port=port)
+    except Exception as error:
+        raise RecordError(
+            f"a picture needs a graphics driver, a software one will do: {error}"
+        ) from error
+    try:
+        yield client
+    finally:
+        client.quit()
+
+
+def _settle(client: ViewerClient) -> bytes:
+    """Return the picture once it stays the same."""
+    until_s = time.monotonic() + PATIENCE_S
+    last, looks = b"", 0
+    while looks < STILL_LOOKS and time.monotonic() < until_s:
+        now: bytes = client.take_screenshot()
+        looks = looks + 1 if now == last else 0
+        last = now
+    return last
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,161 @@
+"""The view is written without a screen, follows a live run, and is a picture of something."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import rerun as rr
+
+from shearline.protocol.codec import encode
+from shearline.protocol.errors import LinkError, RecordError
+from shearline.protocol.keys import Keys
+from shearline.protocol.link import free_endpoint, open_router
+from shearline.protocol.messages import Message, TraceData
+from shearline.record import viewer
+from shearline.record.head import config_of
+from shearline.record.screenshot import screenshot
+from shearline.record.view import APPLICATION, follow, save, view
+from shearline.record.writer import RecordWriter
+
+Messages = Callable[..., list[Message]]
+
+
+def rerun(*arguments: str) -> str:
+    with viewer.quiet_environment() as environment:
+        done = subprocess.run(
+            [viewer.executable(), *arguments],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            env=environment,
+            check=True,
+        )
+    return done.stdout
+
+
+@pytest.fixture
+def saved(write_run: Callable[..., Path], tmp_path: Path) -> Path:
+    path = tmp_path / "run.rrd"
+    save(write_run(), path)
+    return path
+
+
+@pytest.mark.slow
+def test_the_saved_view_is_a_sound_file_with_everything_people_tune_by(saved: Path) -> None:
+    rerun("rrd", "verify", str(saved))
+    listed = rerun("rrd", "print", "-vv", str(saved))
+    for path in (
+        "/success_rate",
+        "/cost/success",
+        "/cost/failure",
+        "/cost/best",
+        "/card",
+        "/parameters/ins_push/success",
+        "/charts/0/lines",
+        "/scene/path",
+        "/scene/forces",
+        "/signals/depth",
+        "/signals/tau_ext",
+        "/phase",
+        "/evaluators/sim-0",
+    ):
+        assert path in listed, path
+    for timeline in ("trial", "played", "clock"):
+        assert timeline in listed, timeline
+
+
+def test_a_run_without_traces_or_names_can_be_viewed(tmp_path: Path, messages: Messages) -> None:
+    with RecordWriter(tmp_path, config_of("bare", tmp_path)) as writer:
+        for log_ns, message in enumerate(messages()):
+            if not isinstance(message, TraceData):
+                writer.write(message, log_ns=log_ns)
+    run = save(tmp_path, tmp_path / "bare.rrd")
+    assert len(run.outcomes) == 8
+    assert (tmp_path / "bare.rrd").stat().st_size > 1000
+
+
+def test_an_empty_run_can_be_viewed(tmp_path: Path) -> None:
+    save(tmp_path, tmp_path / "empty.rrd")
+    assert (tmp_path / "empty.rrd").is_file()
+
+
+def test_without_a_screen_the_way_out_is_said(
+    write_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(RecordError, match=r"no screen here: .*--save view.rrd"):
+        view(write_run())
+
+
+def test_a_missing_viewer_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(RecordError, match=r"install it with pip install"):
+        viewer.executable()
+
+
+def test_the_viewer_itself_says_that_its_statistics_are_off() -> None:
+    before = dict(os.environ)
+    config = json.loads(rerun("analytics", "config"))
+    assert config["analytics_enabled"] is False
+    assert os.environ == before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("at_hand", [False, True])
+def test_a_live_view_follows_a_run_to_its_end(
+    run_dir: Path, tmp_path: Path, messages: Messages, *, at_hand: bool
+) -> None:
+    said, keys = messages(), Keys("synthetic")
+    stream = rr.RecordingStream(APPLICATION, recording_id="live")
+    memory = stream.memory_recording()
+    with open_router(free_endpoint()) as link:
+        link.announce(keys.live_learner(1))
+        ready = threading.Event()
+        thread = threading.Thread(
+            target=follow,
+            args=(link.endpoint, stream),
+            kwargs={
+                "closed": lambda: False,
+                "ready": ready.set,
+                "run_dir": run_dir if at_hand else None,
+            },
+        )
+        thread.start()
+        assert ready.wait(20.0)
+        for message in said:
+            link.publish(keys.obs(message), encode(message))
+        thread.join(20.0)
+        assert not thread.is_alive()
+    path = tmp_path / "live.rrd"
+    path.write_bytes(memory.drain_as_bytes())
+    listed = rerun("rrd", "print", str(path))
+    assert "/success_rate" in listed
+    assert "/scene/path" in listed
+
+
+def test_there_is_nothing_to_follow_without_a_learner() -> None:
+    stream = rr.RecordingStream(APPLICATION, recording_id="nobody")
+    with pytest.raises(LinkError, match="nobody answers"):
+        follow(free_endpoint(), stream, closed=lambda: False, timeout_s=0.2)
+
+
+@pytest.mark.slow
+def test_the_picture_shows_curves_and_not_an_empty_window(
+    write_run: Callable[..., Path], tmp_path: Path
+) -> None:
+    full = tmp_path / "full.png"
+    try:
+        screenshot(write_run(), full, trial=3)
+    except RecordError as error:
+        pytest.skip(str(error))
+    # curves, text and a scene do not compress to what an empty dark window does
+    assert full.stat().st_size > 60_000
