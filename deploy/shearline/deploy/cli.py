@@ -7,11 +7,10 @@ by the command that needs it, when it runs.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 
 from shearline.deploy.commands import bench, doctor, evaluator, learner, operate, show, study, up
-from shearline.deploy.exits import Exit, complain
+from shearline.deploy.exits import complain
 from shearline.deploy.processes import die_with_parent
 
 EPILOG = """\
@@ -41,7 +40,3 @@ def parser() -> argparse.ArgumentParser:
     for module in (up, learner, evaluator, operate, show, bench, study, doctor):
         module.register(commands)
     return top
-
-
-if __name__ == "__main__":
-    sys.exit(main() or Exit.OK)

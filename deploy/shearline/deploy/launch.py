@@ -17,10 +17,11 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from shearline.deploy import processes
+from shearline.deploy.exits import Exit
 from shearline.deploy.observe import Observer
 from shearline.deploy.options import reach
 from shearline.deploy.processes import Child, spawn_command
-from shearline.protocol.errors import LinkError, RecordError, ShearlineError
+from shearline.protocol.errors import ConfigError, LinkError, RecordError, ShearlineError
 from shearline.protocol.messages import CommandKind, Status
 
 #: How often the children are looked after [s]; also how fast a Ctrl-C is noticed.
@@ -70,9 +71,10 @@ class Launch:
     _children: dict[str, Child] = field(default_factory=dict, init=False)
     _restarts: dict[str, int] = field(default_factory=dict, init=False)
     _interrupted: bool = field(default=False, init=False)
+    _began_ns: int = field(default=0, init=False)
 
     def run(self, show: Show) -> dict[str, Any]:
-        """Run to the end and return the summary.
+        """Run to the end, or to an orderly stop, and return the summary.
 
         Args:
             show: Where people look.
@@ -80,9 +82,10 @@ class Launch:
         Raises:
             RunFailed: If the learner gave up.
             LinkError: If it could not listen.
-            KeyboardInterrupt: After an orderly end, if Ctrl-C asked for it.
+            KeyboardInterrupt: If Ctrl-C came before there was anything to sum up.
         """
         self._show = show
+        self._began_ns = time.time_ns()
         with _interruptible(self._interrupt):
             try:
                 self.run_dir.mkdir(parents=True, exist_ok=True)
@@ -91,8 +94,6 @@ class Launch:
                 self._watch()
             finally:
                 processes.end(self._children.values(), patience_s=PATIENCE_S)
-        if self._interrupted:
-            raise KeyboardInterrupt
         return self._summary()
 
     # -- children ------------------------------------------------------------------------------
@@ -178,21 +179,32 @@ class Launch:
     # -- the end -------------------------------------------------------------------------------
 
     def _summary(self) -> dict[str, Any]:
+        """Return what the learner left in its folder in this life of ours."""
         learner = self._children["learner"]
         path = self.run_dir / "summary.json"
-        if learner.returncode != 0 or not path.exists():
-            self._fail(learner)
         try:
-            summary: dict[str, Any] = json.loads(path.read_text())
+            fresh = path.stat().st_mtime_ns >= self._began_ns
+            summary: dict[str, Any] = json.loads(path.read_text()) if fresh else {}
+        except FileNotFoundError:
+            summary = {}
         except (OSError, ValueError) as error:
             raise RecordError(f"cannot read the summary {path}: {error}") from None
-        return summary
+        if learner.returncode in {Exit.OK, Exit.INTERRUPTED} and summary:
+            return summary
+        if self._interrupted:
+            raise KeyboardInterrupt
+        raise _failure(learner)
 
-    @staticmethod
-    def _fail(learner: Child) -> None:
-        """Raise what the learner said when it gave up, as if it had happened here."""
-        said = learner.last_words().removeprefix("shearline: ") or f"the learner {_fate(learner)}"
-        raise (LinkError if learner.returncode == 3 else RunFailed)(said)
+
+def _failure(learner: Child) -> ShearlineError:
+    """Return what the learner said when it gave up, as if it had happened here."""
+    said = learner.last_words().removeprefix("shearline: ") or f"the learner: {_fate(learner)}"
+    match learner.returncode:
+        case Exit.USAGE:
+            return ConfigError(said)
+        case Exit.NOT_CONNECTED:
+            return LinkError(said)
+    return RunFailed(said)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,16 @@ from rich.table import Table
 
 from shearline.deploy.table import duration, number
 
+#: Columns of a page that is not a terminal.
+PIPE_COLUMNS = 110
 #: Things that should be nothing; only those that happened are said.
-TROUBLES = ("lost", "duplicates", "late", "aborted", "rejected")
+TROUBLES = {
+    "lost": "lost",
+    "duplicates": "duplicate results ignored",
+    "late": "late",
+    "aborted": "attempts aborted",
+    "rejected": "attempts rejected",
+}
 
 
 def print_summary(summary: Mapping[str, Any], run_dir: Path, units: Mapping[str, str]) -> None:
@@ -23,13 +32,16 @@ def print_summary(summary: Mapping[str, Any], run_dir: Path, units: Mapping[str,
         run_dir: The run folder.
         units: Unit of each parameter.
     """
-    console = Console()
+    # A pipe has no width of its own; a table must not break there.
+    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS)
     console.print(_episodes(summary))
-    troubles = [f"{summary[name]} {name}" for name in TROUBLES if summary[name]]
+    troubles = [f"{summary[name]} {text}" for name, text in TROUBLES.items() if summary[name]]
     console.print(
         f"\n{summary['counted']} trials counted in {duration(summary['wall_s'])} min"
-        + (f" ({', '.join(troubles)})" if troubles else ", none lost")
+        + (f" ({', '.join(troubles)})" if troubles else ", each once")
     )
+    if summary["state"] != "complete":
+        console.print(f"stopped: {summary['why']}; the same command with --out {run_dir} goes on")
     if summary.get("recommendation"):
         console.print(_recommendation(summary["recommendation"], units))
     console.print("\nlook at it   ", f"shearline view {run_dir}", soft_wrap=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
 from shearline.deploy.exits import Exit
@@ -34,6 +35,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     asked = resolve_run(arguments)
     summary = lead(asked.config, asked.run_dir, arguments.listen, resume=arguments.resume)
+    if summary.why:
+        print(f"shearline: {summary.why}", file=sys.stderr, flush=True)
     if arguments.json:
         print(json.dumps(summary.to_dict()), flush=True)
     return {"complete": Exit.OK, "stopped": Exit.INTERRUPTED}.get(summary.state, Exit.RUN_FAILED)

@@ -5,9 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from shearline.deploy.exits import Exit
 from shearline.deploy.options import Subparsers, add_json, add_run, at_least, run_arguments
+
+if TYPE_CHECKING:
+    from shearline.deploy.launch import Launch
 
 
 def register(commands: Subparsers) -> None:
@@ -35,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     from shearline.deploy.resolve import resolve_run  # noqa: PLC0415 - may import the user's task
 
     asked = resolve_run(arguments)
-    from shearline.deploy.launch import Launch, QuietShow  # noqa: PLC0415 - loads zenoh
+    from shearline.deploy.launch import Launch  # noqa: PLC0415 - loads zenoh
     from shearline.protocol.link import check_endpoint, free_endpoint  # noqa: PLC0415
 
     launch = Launch(
@@ -45,15 +49,23 @@ def run(arguments: argparse.Namespace) -> int:
         task=asked.own_task,
         learner_arguments=[*run_arguments(arguments), "--out", str(asked.run_dir)],
     )
+    summary = _launched(launch, as_json=arguments.json)
     if arguments.json:
-        print(json.dumps(launch.run(QuietShow())))
-        return Exit.OK
+        print(json.dumps(summary))
+    else:
+        from shearline.deploy.summary import print_summary  # noqa: PLC0415 - loads rich
 
+        space = asked.config.space
+        print_summary(summary, asked.run_dir, dict(zip(space.names, space.units, strict=True)))
+    return Exit.OK if summary["state"] == "complete" else Exit.INTERRUPTED
+
+
+def _launched(launch: Launch, *, as_json: bool) -> dict[str, Any]:
+    if as_json:
+        from shearline.deploy.launch import QuietShow  # noqa: PLC0415 - loads zenoh
+
+        return launch.run(QuietShow())
     from shearline.deploy.live import LiveShow  # noqa: PLC0415 - loads rich, for people only
-    from shearline.deploy.summary import print_summary  # noqa: PLC0415
 
     with LiveShow() as show:
-        summary = launch.run(show)
-    space = asked.config.space
-    print_summary(summary, asked.run_dir, dict(zip(space.names, space.units, strict=True)))
-    return Exit.OK
+        return launch.run(show)
