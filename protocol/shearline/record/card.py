@@ -17,7 +17,7 @@ def card(counted: Counted, config: RunConfig | None) -> str:
     lines = [
         f"# Trial {counted.trial}: {outcome}{why}",
         "",
-        f"**cost {counted.cost:.4g}**, episode {counted.episode}, on {counted.evaluator or '-'}",
+        f"**cost {counted.cost:.4g}**, episode {counted.episode + 1}, on {counted.evaluator or '-'}",
         f"{when}{', late' if counted.late else ''}",
         "",
         *_parameters(counted, config),

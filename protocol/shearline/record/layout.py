@@ -90,7 +90,7 @@ def _eye(tip: npt.NDArray[np.float32], *, down_z: bool) -> rrb.EyeControls3D:
     size = max(float(np.linalg.norm(high - low)), 0.01)
     return rrb.EyeControls3D(
         kind="Orbital",
-        position=(centre + size * np.array([0.75, -0.75, 0.4 * up])).tolist(),
+        position=(centre + size * np.array([0.9, -0.9, 0.5 * up])).tolist(),
         look_target=centre.tolist(),
         eye_up=[0.0, 0.0, up],
     )

@@ -324,7 +324,8 @@ class Picture:
 
 
 def _title(group: columns.Group) -> str:
-    return f"{group.name.replace('_', ' ')} [{group.unit}]" if group.unit else group.name
+    name = "push and wiggle" if group.name == "push_wiggle" else group.name
+    return f"{name} [{group.unit}]" if group.unit else name
 
 
 def _labels(
