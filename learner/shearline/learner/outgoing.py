@@ -1,8 +1,9 @@
 """What leaves the learner: messages to evaluators, to observers, and copies for the record.
 
-Everything is sent with ``observe``: dropped rather than ever making the owner wait for a peer
-that does not read. Nothing depends on a single message: attempts that are not renewed are given
-out again, results are sent again until acknowledged, commands are repeated.
+Everything is dropped rather than ever making the owner wait for a peer that does not read; what
+evaluators are told goes ahead of what observers see. Nothing depends on a single message: attempts
+that are not renewed are given out again, results are sent again until acknowledged, commands are
+repeated.
 """
 
 from __future__ import annotations
@@ -66,5 +67,5 @@ class Outgoing:
 
     def _send(self, key: str, message: Message, now_s: float) -> None:
         payload = encode(message)
-        self._link.observe(key, payload)
+        self._link.publish(key, payload, wait=False)
         self.copy(key, payload, now_s, sent=True)

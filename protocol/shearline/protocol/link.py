@@ -55,7 +55,9 @@ _COMMON: Mapping[str, object] = {
     "connect/retry": {"period_init_ms": 50, "period_max_ms": 400, "period_increase_factor": 2},
     # A put to a stopped process else blocks the sender for 5 s.
     "transport/link/tx/queue/congestion_control/block/wait_before_close": 500_000,
-    # Traces: with Zenoh's 2 batches, 1 in 25 of 100 kB was dropped on a loaded machine.
+    # What may be dropped is, once its queue is full: with Zenoh's 2 batches of 64 kB, 1 in 25
+    # traces of 100 kB was, on a loaded machine. Observer streams have a queue of their own.
+    "transport/link/tx/queue/size/data": 16,
     "transport/link/tx/queue/size/data_low": 16,
     "transport/link/rx/max_message_size": 2 * BULK_BYTES_MAX,
 }
@@ -104,12 +106,16 @@ class Link:
         _open_links.add(self)
         _guard_exit()
 
-    def publish(self, key: str, payload: bytes) -> None:
+    def publish(self, key: str, payload: bytes, *, wait: bool = True) -> None:
         """Send bytes in order and without loss while the connection lasts; else they vanish.
 
-        Blocks for at most half a second on a peer that stopped reading.
+        Args:
+            key: Where.
+            payload: What.
+            wait: Block on a peer that does not read, for at most half a second; else drop.
         """
-        self._session.put(key, payload, congestion_control=self._block)
+        control = self._block if wait else self._drop
+        self._session.put(key, payload, congestion_control=control)
 
     def observe(self, key: str, payload: bytes) -> None:
         """Send bytes that may be dropped, overtake nothing and never make the sender wait."""
