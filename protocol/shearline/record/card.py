@@ -13,11 +13,12 @@ def card(counted: Counted, config: RunConfig | None) -> str:
     """Return the card of one trial as Markdown, parameters with units and place in their range."""
     outcome = counted.kind.value if counted.kind else "lost"
     why = f" ({counted.why})" if counted.why else ""
+    where = f"episode {counted.episode + 1}, on {counted.evaluator or '-'}"
     when = f"in {counted.wall_s:.2f} s, attempt {counted.attempts}, seed {counted.seed}"
     lines = [
         f"# Trial {counted.trial}: {outcome}{why}",
         "",
-        f"**cost {counted.cost:.4g}**, episode {counted.episode + 1}, on {counted.evaluator or '-'}",
+        f"**cost {counted.cost:.4g}**, {where}",
         f"{when}{', late' if counted.late else ''}",
         "",
         *_parameters(counted, config),
