@@ -84,6 +84,7 @@ class Journal:
         except OSError as fault:
             # Half a record would hide whatever a later start writes behind it.
             os.ftruncate(self._fd, self._end)
+            os.lseek(self._fd, self._end, os.SEEK_SET)
             raise RecordError(
                 f"cannot write the journal {self.path}: {fault.strerror}:"
                 " make room, then start the learner on this folder again"
