@@ -79,3 +79,10 @@ def test_a_learner_is_alive_as_long_as_one_of_its_tokens_is() -> None:
     inbox.put(Presence("live/learner/2", alive=False))
     assert not inbox.any_learner()
     assert drain(inbox) == []
+
+
+def test_one_waits_for_a_learner_only_so_long() -> None:
+    inbox = Inbox()
+    assert not inbox.wait_for_learner(0.0)
+    inbox.put(Presence("live/learner/1", alive=True))
+    assert inbox.wait_for_learner(0.0)

@@ -69,6 +69,21 @@ def test_the_saved_view_is_a_sound_file_with_everything_people_tune_by(saved: Pa
         assert timeline in listed, timeline
 
 
+@pytest.mark.slow
+def test_rerun_opens_the_record_itself_field_by_field(
+    write_run: Callable[..., Path], tmp_path: Path
+) -> None:
+    record = write_run() / "record.mcap"
+    checked = rerun("mcap", "check", "--full", str(record))
+    assert "/trial/outcome" in checked
+    rerun("mcap", "convert", str(record), "-o", str(tmp_path / "plain.rrd"))
+    listed = rerun("rrd", "print", "-vv", str(tmp_path / "plain.rrd"))
+    assert "shearline.Counted:message" in listed
+    assert '"cost": non-null Float64' in listed
+    assert '"data": List(non-null Float32)' in listed
+    assert "InstancePoses3D:translations" in listed
+
+
 def test_a_run_without_traces_or_names_can_be_viewed(tmp_path: Path, messages: Messages) -> None:
     with RecordWriter(tmp_path, config_of("bare", tmp_path)) as writer:
         for log_ns, message in enumerate(messages()):

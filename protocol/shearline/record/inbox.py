@@ -67,6 +67,7 @@ class Inbox:
             with self._ready:
                 change = self._learners.add if arrival.alive else self._learners.discard
                 change(arrival.key)
+                self._ready.notify_all()
             return
         item = Item(arrival.key, arrival.payload, time.time_ns())
         with self._ready:
@@ -83,6 +84,15 @@ class Inbox:
         """Tell whether a learner of the run is alive, as far as its tokens say."""
         with self._ready:
             return bool(self._learners)
+
+    def wait_for_learner(self, timeout_s: float) -> bool:
+        """Wait for a learner's token; tell whether one came.
+
+        Declarations travel in order: once the token is here, the learner's session has also
+        heard of every subscription declared before the watch, and nothing is missed any more.
+        """
+        with self._ready:
+            return self._ready.wait_for(lambda: bool(self._learners), timeout_s)
 
     def take_dropped(self) -> tuple[Dropped, Dropped]:
         """Return what was dropped of traces and of all else since the last call."""

@@ -41,6 +41,8 @@ GONE_S = 5.0
 QUIET_S = 0.5
 #: ... but not for ever.
 GRACE_S = 5.0
+#: A learner that is there is heard of within milliseconds; do not insist on one [s].
+HEARD_S = 2.0
 #: Pause between looks at the clock while nothing comes [s].
 TICK_S = 0.1
 
@@ -76,6 +78,7 @@ def record_run(
         link.subscribe(Keys(run).observed(), queue)
         link.watch(Keys(run).live_learners(), queue)
         with RecordWriter(run_dir, config_of(run, run_dir)) as writer:
+            inbox.wait_for_learner(HEARD_S)
             ready()
             _Recorder(inbox, writer, silence_s, stopped).work()
 

@@ -118,7 +118,10 @@ def follow(
     inbox = Inbox(bulk_bytes_max=LIVE_BULK_BYTES)
     with open_client(connect, timeout_s) as link:
         run, _ = discover(link, timeout_s)
-        link.subscribe(Keys(run).observed(), cast("SimpleQueue[Any]", inbox))
+        queue = cast("SimpleQueue[Any]", inbox)
+        link.subscribe(Keys(run).observed(), queue)
+        link.watch(Keys(run).live_learners(), queue)
+        inbox.wait_for_learner(timeout_s)
         so_far = open_run(run_dir) if run_dir else None
         live = _Live(stream, so_far)
         ready()
