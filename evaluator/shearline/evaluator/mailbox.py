@@ -173,7 +173,7 @@ class Mailbox:
 
     def wait_s(self, now_s: float) -> float:
         """Return how long nothing need be done [s], at most :data:`WAIT_S_MAX`."""
-        due_s = [now_s + WAIT_S_MAX, self._hello_s, self._life_s]
+        due_s = [self._hello_s, self._life_s]
         if self.welcomed:
             due_s += [unacked.due_s for unacked in self.unacked.values()]
         if self.running is not None:
@@ -181,7 +181,7 @@ class Mailbox:
         if self.leaving is not None:
             due_s.append(self.leaving.until_s)
             due_s.append(NEVER_S if self.leaving.aborted else self.leaving.abort_s)
-        return max(0.0, min(due_s) - now_s)
+        return min(WAIT_S_MAX, max(0.0, min(due_s) - now_s))
 
     # -- the learner comes and goes -------------------------------------------------------------
 
