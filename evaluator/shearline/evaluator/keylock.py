@@ -15,7 +15,6 @@ from shearline.evaluator.keylock_spec import (
     COST_PER_M,
     ROI_M,
     SKILL_VERSION,
-    TRIAL_S,
     Level,
     keylock_spec,
     level,
@@ -110,7 +109,7 @@ class KeylockTask:
             digest=trace.digest(rows),
             extras={
                 "depth_m": float(end.depth_m),
-                "insertion_s": end.clock_ticks * TICK_S,
+                "insertion_s": max(end.clock_ticks, 0) * TICK_S,
                 "trial_s": len(rows) * TICK_S,
                 "offset_m": float(np.linalg.norm(off[:3])),
                 "tilt_rad": float(np.linalg.norm(off[3:])),

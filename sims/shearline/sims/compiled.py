@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from llvmlite import ir
+from llvmlite import ir  # type: ignore[import-untyped] # ships no types
 from numba import types
 from numba.extending import intrinsic
 
@@ -31,11 +31,11 @@ _COMPILED = ("sims", "evaluator/skill")
 
 def compiled(function: Function) -> Function:
     """Compile ``function`` to machine code on first use, and keep it for the next process."""
-    machine: Function = numba.njit(cache=True, error_model="numpy")(function)
+    machine: Function = numba.njit(cache=True, error_model="numpy", forceinline=True)(function)
     return machine
 
 
-@intrinsic  # type: ignore[untyped-decorator] # numba ships no types
+@intrinsic
 def call_with_two_addresses(
     _typing: Any, _function: Any, _first: Any, _second: Any
 ) -> tuple[Any, Any]:
@@ -80,7 +80,7 @@ def _cache_folder() -> str:
             continue
         if os.access(folder, os.W_OK):
             return str(folder)
-    return numba.config.CACHE_DIR
+    return str(numba.config.CACHE_DIR)
 
 
 numba.config.CACHE_DIR = _cache_folder()

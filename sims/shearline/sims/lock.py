@@ -10,6 +10,7 @@ Nothing here knows an engine, a pose in the world or a skill.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -150,16 +151,20 @@ def bitting(key: Key) -> list[Box]:
     corners = key.profile()
     return [
         _slab(f"bitting{i}", start, end, key.thickness_m / 2.0)
-        for i, (start, end) in enumerate(zip(corners, corners[1:], strict=False))
+        for i, (start, end) in enumerate(itertools.pairwise(corners))
     ]
 
 
-def back(key: Key) -> Box:
-    """Return the uncut part of the blade, which is drawn but touches nothing."""
-    top = key.height_m / 2.0 - max(key.nose_m * key.slope, *key.cut_depth_m)
-    low = -key.height_m / 2.0
-    half = (key.thickness_m / 2.0, (top - low) / 2.0, key.length_m / 2.0)
-    return Box("back", (0.0, (top + low) / 2.0, -half[2]), half)
+def body(key: Key) -> list[Box]:
+    """Return what lies under the slabs of the bitting; it is drawn but touches nothing."""
+    low, half_x = -key.height_m / 2.0, key.thickness_m / 2.0
+    corners = key.profile()
+    boxes = []
+    for i, ((s0, y0), (s1, y1)) in enumerate(itertools.pairwise(corners)):
+        top = min(y0, y1)
+        centre = (0.0, (low + top) / 2.0, -(s0 + s1) / 2.0)
+        boxes.append(Box(f"body{i}", centre, (half_x, (top - low) / 2.0, (s1 - s0) / 2.0)))
+    return boxes
 
 
 def walls(lock: Lock) -> list[Box]:

@@ -186,12 +186,11 @@ class MujocoPlant:
 
 
 def _handles(model: Any, data: Any, substeps: int) -> Handles:
-    library = ctypes.CDLL(str(_library()))
     tip = model.site("tip").id
     lock = model.body("lock").id
     return Handles(
-        step1=_address(library.mj_step1),
-        step2=_address(library.mj_step2),
+        step1=library_address("mj_step1"),
+        step2=library_address("mj_step2"),
         model=model._address,  # noqa: SLF001 - MuJoCo's documented way to the C struct
         data=data._address,  # noqa: SLF001
         substeps=substeps,
@@ -210,12 +209,17 @@ def _handles(model: Any, data: Any, substeps: int) -> Handles:
     )
 
 
-def _address(function: Any) -> int:
-    return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
+def library_address(function: str) -> int:
+    """Return the address of a C function of the MuJoCo that the Python bindings have loaded.
+
+    Raises:
+        PlantError: If the installed package is not as expected.
+    """
+    pointer = getattr(ctypes.CDLL(str(_library())), function)
+    return int(ctypes.cast(pointer, ctypes.c_void_p).value or 0)
 
 
 def _library() -> Path:
-    """Return the shared library that the Python bindings have loaded."""
     found = sorted(Path(mujoco.__file__).parent.glob("libmujoco.so*"))
     if len(found) != 1:
         raise PlantError(

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shearline.sims import panda
-from shearline.sims.lock import Box, Lock, Pin, back, bitting, blade, walls
+from shearline.sims.lock import Box, Lock, Pin, bitting, blade, body, walls
 from shearline.sims.panda import Array, Link
 
 #: Joint angles from which every trial starts: the tool points straight down [rad].
@@ -122,7 +122,8 @@ def quaternion(rotation: Array) -> Array:
     w = math.sqrt(float(candidates[largest]))
     row = products[largest] / (4.0 * w)
     row[largest] = w
-    return row / np.linalg.norm(row)
+    unit: Array = row / np.linalg.norm(row)
+    return unit
 
 
 def _mjcf(scene: Scene) -> str:
@@ -134,15 +135,17 @@ def _mjcf(scene: Scene) -> str:
  jacobian="dense" impratio="{s.impratio!r}"/>
 <size memory="8M"/>
 <visual><global offwidth="1280" offheight="960" fovy="35"/><map znear="0.002"/>
-<quality shadowsize="4096"/><headlight ambient=".45 .45 .45" diffuse=".45 .45 .45"/></visual>
+<quality shadowsize="4096"/><headlight ambient=".40 .40 .40" diffuse=".40 .40 .40"/></visual>
+<asset><texture type="skybox" builtin="gradient" rgb1="1 1 1" rgb2=".86 .89 .93" width="64"
+ height="384"/></asset>
 <default>
 <geom condim="3" friction="{lock.friction!r} 0.005 0.0001" solref="{_text(s.solref)}"
  solimp="{_text(s.solimp)}" mass="0"/>
 <default class="drawn"><geom contype="0" conaffinity="0" group="1"/></default>
-<default class="wall"><geom type="box" contype="1" conaffinity="0" rgba=".80 .66 .36 1" group="2"/>
+<default class="wall"><geom type="box" contype="1" conaffinity="0" rgba=".70 .55 .26 1" group="2"/>
 </default>
 <default class="blade"><geom type="box" contype="0" conaffinity="1" group="4"/></default>
-<default class="bitting"><geom type="box" contype="0" conaffinity="2" rgba=".75 .77 .80 1"
+<default class="bitting"><geom type="box" contype="0" conaffinity="2" rgba=".58 .61 .66 1"
  group="1"/></default>
 <default class="pin"><geom type="capsule" contype="2" conaffinity="0" rgba=".85 .35 .22 1"
  group="3"/><joint type="slide" axis="0 1 0" range="0 {lock.pin_travel_m!r}"
@@ -160,7 +163,8 @@ def _mjcf(scene: Scene) -> str:
 {_arm(panda.LINKS, scene)}
 <body name="lock" mocap="true" pos="{_text(believed.position)}"
  quat="{_text(quaternion(believed.rotation))}">
-{"".join(_geom(box, "wall") for box in walls(lock))}{"".join(_pin(pin, lock) for pin in lock.pins())}
+{"".join(_geom(box, "wall") for box in walls(lock))}
+{"".join(_pin(pin, lock) for pin in lock.pins())}
 </body>
 </worldbody>
 </mujoco>
@@ -203,7 +207,8 @@ def _tool(scene: Scene) -> str:
     key = scene.lock.key
     turn = KEY_TURN / 2.0
     bow = TIP_M - panda.HAND_REACH_M - key.length_m
-    boxes = _geom(blade(key), "blade") + _geom(back(key), "drawn", ".75 .77 .80 1")
+    boxes = _geom(blade(key), "blade")
+    boxes += "".join(_geom(box, "drawn", ".58 .61 .66 1") for box in body(key))
     boxes += "".join(_geom(box, "bitting") for box in bitting(key))
     half = math.pi / 8.0
     return f"""<body name="hand" pos="0 0 {panda.FLANGE_M!r}"
@@ -219,7 +224,7 @@ def _tool(scene: Scene) -> str:
 <inertial pos="0 0 {-key.length_m!r}" mass="{KEY_MASS!r}" diaginertia="4e-6 4e-6 2e-6"/>
 <site name="tip" size="0.0003" group="5"/>
 <geom class="drawn" type="box" pos="0 0 {-key.length_m - bow / 2.0!r}"
- size="{key.thickness_m / 2.0!r} .0095 {bow / 2.0!r}" rgba=".75 .77 .80 1"/>
+ size="{key.thickness_m / 2.0!r} .0095 {bow / 2.0!r}" rgba=".58 .61 .66 1"/>
 {boxes}
 </body>"""
 

@@ -7,6 +7,7 @@ any other plant. Both write the same rows.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -81,15 +82,12 @@ def execute_compiled(
         PlantError: If the simulation is no longer physical.
     """
     rows = np.empty((TICKS_MAX, len(COLUMNS))) if rows is None else rows
-    plant.reset(setup)
-    state, now, done = empty_state(), beginning(), 0
+    state, now, done = _begin(plant, setup, job), beginning(), 0
     while not _finished(now, extract=job.extract):
         if done >= TICKS_MAX:
             raise TrialAborted(f"no verdict after {TRIAL_MAX_S:.1f} s: the skill does not end")
         until = min(done + CHUNK_TICKS, TICKS_MAX)
-        now, done = run_ticks(
-            plant.handles, state, now, job.p, job.limits, job.arm, job.extract, rows, done, until
-        )
+        now, done = run_ticks(plant.handles, state, now, job, rows, done, until)
         plant.check()
         beat()
     return now, rows[:done]
@@ -100,8 +98,7 @@ def execute(
 ) -> tuple[Decision, Array]:
     """Run one trial on any plant, tick by tick; arguments and results as above."""
     rows = np.empty((TICKS_MAX, len(COLUMNS)))
-    plant.reset(setup)
-    state, now, done = empty_state(), beginning(), 0
+    state, now, done = _begin(plant, setup, job), beginning(), 0
     while not _finished(now, extract=job.extract):
         if done >= TICKS_MAX:
             raise TrialAborted(f"no verdict after {TRIAL_MAX_S:.1f} s: the skill does not end")
@@ -120,10 +117,7 @@ def run_ticks(
     handles: Handles,
     state: State,
     now: Decision,
-    p: Parameters,
-    limits: Limits,
-    arm: Arm,
-    extract: bool,  # noqa: FBT001 - compiled functions take no keywords
+    job: Job,
     rows: Array,
     done: int,
     until: int,
@@ -131,13 +125,27 @@ def run_ticks(
     """Run ticks ``done`` to ``until`` or to the end of the skill; return where it stands."""
     while done < until:
         begin_tick(handles, state.percept)
-        now = tick(state, now, p, limits, arm, TICK_S)
+        now = tick(state, now, job.p, job.limits, job.arm, TICK_S)
         write_row(rows[done], state, now)
         end_tick(handles, state.feel.tau)
         done += 1
-        if now.phase == END or (now.verdict != OPEN and not extract):
+        if now.phase == END or (now.verdict != OPEN and not job.extract):
             break
     return now, done
+
+
+def _begin(plant: Plant, setup: Setup, job: Job) -> State:
+    """Reset the plant and check the preconditions."""
+    plant.reset(setup)
+    state = empty_state()
+    plant.sense(state.percept)
+    x, y, depth = (float(value) for value in state.percept.in_lock)
+    if not may_start(depth, math.hypot(x, y), state.percept.contact, job.limits):
+        raise TrialAborted(
+            f"the skill may not start with the tip {depth * 1e3:.1f} mm deep and"
+            f" {math.hypot(x, y) * 1e3:.1f} mm off the axis: free the key, bring it before the lock"
+        )
+    return state
 
 
 def _finished(now: Decision, *, extract: bool) -> bool:

@@ -89,8 +89,8 @@ class Decision(NamedTuple):
         phase: One of the phases.
         phase_ticks: Ticks spent in it.
         search_ticks: Ticks since the contact phase began.
-        clock_ticks: Ticks since the tip first crossed the mouth plane; stops with the verdict.
-        crossed: Whether it has.
+        clock_ticks: Ticks since the tip first crossed the mouth plane, -1 before; stops with the
+            verdict.
         verdict: One of the verdicts.
         depth_m: Depth of the tip at the verdict [m].
     """
@@ -99,7 +99,6 @@ class Decision(NamedTuple):
     phase_ticks: int
     search_ticks: int
     clock_ticks: int
-    crossed: bool
     verdict: int
     depth_m: float
 
@@ -107,7 +106,7 @@ class Decision(NamedTuple):
 @compiled
 def beginning() -> Decision:
     """Return where every trial stands before its first tick."""
-    return Decision(APPROACH, -1, 0, 0, False, OPEN, 0.0)
+    return Decision(APPROACH, -1, 0, -1, OPEN, 0.0)
 
 
 @compiled
@@ -141,15 +140,15 @@ def decide(
     """
     if before.verdict != OPEN:
         return _after_verdict(before, sight, tick_s)
-    crossed = before.crossed or sight.depth_m >= 0.0
-    clock = before.clock_ticks + 1 if before.crossed else 0
+    inside = before.clock_ticks >= 0 or sight.depth_m >= 0.0
+    clock = before.clock_ticks + 1 if inside else -1
     search = before.search_ticks + 1 if before.phase != APPROACH else 0
-    verdict = _verdict(sight, tau_ext, limits, clock * tick_s, search * tick_s, crossed)
+    verdict = _verdict(sight, tau_ext, limits, clock * tick_s, search * tick_s)
     if verdict != OPEN:
-        return Decision(EXTRACTION, 0, search, clock, crossed, verdict, sight.depth_m)
+        return Decision(EXTRACTION, 0, search, clock, verdict, sight.depth_m)
     phase = _next_phase(before, sight, p, tick_s)
     ticks = before.phase_ticks + 1 if phase == before.phase else 0
-    return Decision(phase, ticks, search, clock, crossed, OPEN, sight.depth_m)
+    return Decision(phase, ticks, search, clock, OPEN, sight.depth_m)
 
 
 @compiled
@@ -162,9 +161,7 @@ def _next_phase(before: Decision, sight: Sight, p: Parameters, tick_s: float) ->
 
 
 @compiled
-def _verdict(
-    sight: Sight, tau_ext: Array, limits: Limits, clock_s: float, search_s: float, crossed: bool
-) -> int:
+def _verdict(sight: Sight, tau_ext: Array, limits: Limits, clock_s: float, search_s: float) -> int:
     searching = search_s > 0.0
     for j in range(tau_ext.shape[0]):
         if abs(tau_ext[j]) > limits.torque[j]:
@@ -175,7 +172,7 @@ def _verdict(
         return SUCCESS
     if clock_s >= TIME_MAX_S:
         return TIME
-    if not crossed and search_s >= SEARCH_MAX_S:
+    if clock_s < 0.0 and search_s >= SEARCH_MAX_S:
         return SEARCH
     return OPEN
 
@@ -190,7 +187,6 @@ def _after_verdict(before: Decision, sight: Sight, tick_s: float) -> Decision:
         ticks,
         before.search_ticks,
         before.clock_ticks,
-        before.crossed,
         before.verdict,
         before.depth_m,
     )

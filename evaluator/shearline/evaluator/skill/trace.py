@@ -95,7 +95,7 @@ def _events(rows: Array, end: Decision, tick_s: float) -> tuple[tuple[float, str
     starts = np.flatnonzero(np.diff(phase, prepend=-1))
     events = [(float(tick) * tick_s, PHASES[phase[tick]]) for tick in starts]
     inside = np.flatnonzero(depth >= 0.0)
-    if end.crossed and inside.size:
+    if end.clock_ticks >= 0 and inside.size:
         events.append((float(inside[0]) * tick_s, "mouth"))
     verdict = VERDICTS[end.verdict] or "success"
     events.append((_verdict_tick(rows, phase) * tick_s, verdict))
