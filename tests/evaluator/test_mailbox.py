@@ -222,6 +222,13 @@ def test_an_attempt_is_run_once_however_often_and_whenever_it_comes() -> None:
     assert not said((i for _, i in drive(box, 5.0, 0.7)), Result)
 
 
+def test_a_trial_that_nobody_had_room_for_is_not_taken() -> None:
+    box = joined(warm=False)
+    assert not box.handle(Heard(trial(1)), 0.0)
+    box.handle(Ready("engine", "digest"), 0.1)
+    assert of(box.handle(Heard(trial(1)), 0.2), Run)
+
+
 def test_a_result_is_sent_again_ever_more_slowly_until_it_is_acknowledged() -> None:
     box = busy(1)
     out = [(0.5, i) for i in box.handle(Ended(result(1)), 0.5)]
@@ -443,6 +450,7 @@ class AnyStory(RuleBasedStateMachine):
     def tell(self, event: Event) -> None:
         out = self.box.handle(event, self.now_s)
         assert not (self.over and out)
+        assert self.box.warm or not of(out, Run)
         self.ran += [run.trial.token for run in of(out, Run)]
         for sent in said(out, Message):
             encode(sent)

@@ -411,14 +411,40 @@ def test_a_task_that_cannot_be_taken_from_the_learner_ends_the_worker(
         learner.next(Bye)
 
 
-def test_a_task_that_cannot_be_warmed_ends_the_worker(learner: TinyLearner) -> None:
+@pytest.mark.parametrize(
+    ("fault", "code", "why"),
+    [
+        (OSError("no engine"), 4, "task sleep-1 cannot start here: OSError: no engine"),
+        (ConfigError("no such level"), 2, "no such level"),
+        (ModuleNotFoundError(name="mujoco"), 2, "needs mujoco, which is not installed here"),
+    ],
+)
+def test_a_task_that_cannot_be_warmed_ends_the_worker(
+    learner: TinyLearner, fault: Exception, code: int, why: str
+) -> None:
     class Cold(BowlTask):
         def warm(self) -> None:
-            raise OSError("no engine")
+            raise fault
 
     with working(learner.endpoint, Cold(1)) as worker:
         learner.welcome()
-        assert worker.end() == End(4, "task sleep-1 cannot start here: OSError: no engine")
+        end = worker.end()
+        assert end.code == code
+        assert why in end.why
+
+
+def test_a_task_that_never_gets_warm_does_not_keep_the_process(learner: TinyLearner) -> None:
+    thawed = threading.Event()
+
+    class Frozen(BowlTask):
+        def warm(self) -> None:
+            thawed.wait(WAIT_S)
+
+    with working(learner.endpoint, Frozen(1)) as worker:
+        learner.welcome()
+        learner.stop()
+        assert worker.exits.get(timeout=WAIT_S) == 0
+        thawed.set()
 
 
 def test_a_refused_worker_ends_with_the_learners_reason(learner: TinyLearner) -> None:

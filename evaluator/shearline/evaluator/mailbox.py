@@ -256,9 +256,12 @@ class Mailbox:
             self.unacked[trial.token] = _Unacked(result, now_s)
         elif trial.token in self.unacked:
             self.unacked[trial.token].due_s = now_s
-        elif trial.token not in self.held and len(self.held) < HELD_MAX and self.leaving is None:
+        elif trial.token not in self.held and self._has_room():
             self.held[trial.token] = trial
             self._out.append(Run(trial))
+
+    def _has_room(self) -> bool:
+        return self.warm and self.leaving is None and len(self.held) < HELD_MAX
 
     def _acked(self, token: str) -> None:
         unacked = self.unacked.pop(token, None)

@@ -160,6 +160,9 @@ class Worker:
             self._engine = clip(task.engine)
         except ConfigError as fault:
             self.exchange.leave(2, str(fault))
+        except ModuleNotFoundError as fault:
+            why = f"task {task.spec.name} needs {fault.name}, which is not installed here"
+            self.exchange.leave(2, f"{why}: pip install 'shearline[all]' brings all that is needed")
         except Exception as fault:
             log.debug("warming failed", exc_info=True)
             why = f"task {task.spec.name} cannot start here: {type(fault).__name__}: {fault}"
