@@ -8,6 +8,7 @@ Fields are only ever added, with a default; a change of meaning raises ``VERSION
 from __future__ import annotations
 
 import enum
+import hashlib
 from typing import Annotated
 
 import msgspec
@@ -359,7 +360,9 @@ def clip(text: str, chars: int = TEXT_CHARS_MAX) -> str:
 
 
 def digest(task: TaskSpec) -> str:
-    """Return 16 hexadecimal digits that differ when what is being learned differs."""
-    import hashlib  # noqa: PLC0415 - only here
+    """Return 16 hexadecimal digits that differ when what is being learned differs.
 
-    return hashlib.sha256(msgspec.json.encode(task, order="sorted")).hexdigest()[:16]
+    The order of parameters is part of it, since a tuple has no names; that of options is not.
+    """
+    facts = (task.name, list(task.space.items()), sorted(task.options.items()), task.trial_s)
+    return hashlib.sha256(msgspec.json.encode(facts)).hexdigest()[:16]
