@@ -147,8 +147,7 @@ def _left_to_go(t_s: float) -> float:
 
 @compiled
 def _contact(c: Command, tip: Array, p: Parameters, tick_s: float) -> None:
-    c.x[2] = min(c.x[2] + p.con_speed * tick_s, tip[2] + LEAD_M)
-    c.v[2] = p.con_speed
+    _axial(c, min(c.x[2] + p.con_speed * tick_s, tip[2] + LEAD_M), tick_s)
     _hold(c, p.con_k_xy, AXIAL_K, p.ins_k_rot, p.xi)
 
 
@@ -181,9 +180,15 @@ def _insertion(
 def _extraction(c: Command, phase_ticks: int, tip: Array, tick_s: float) -> None:
     if phase_ticks == 0:
         c.x[:] = tip
-    c.x[2] = max(c.x[2] - EXTRACTION_SPEED * tick_s, tip[2] - LEAD_M)
-    c.v[2] = -EXTRACTION_SPEED
+    _axial(c, max(c.x[2] - EXTRACTION_SPEED * tick_s, tip[2] - LEAD_M), tick_s)
     _hold(c, APPROACH_K / 6.0, AXIAL_K, APPROACH_K_ROT / 6.0, APPROACH_XI)
+
+
+@compiled
+def _axial(c: Command, z: float, tick_s: float) -> None:
+    """Move the axial reference to ``z``, with the speed that it truly has."""
+    c.v[2] = (z - c.x[2]) / tick_s
+    c.x[2] = z
 
 
 @compiled
