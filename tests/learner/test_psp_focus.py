@@ -23,7 +23,7 @@ def trials(*groups: tuple[float, int, int, float]) -> Trials:
 
 
 def chosen(*groups: tuple[float, int, int, float]) -> float:
-    return float(component_focus(MIXTURE, trials(*groups)).centre[0])
+    return round(float(component_focus(MIXTURE, trials(*groups)).centre[0]), 9)
 
 
 def test_of_two_that_hold_alike_the_cheaper_one_is_chosen() -> None:
@@ -45,3 +45,7 @@ def test_a_component_without_a_success_is_never_chosen_over_one_with() -> None:
 
 def test_without_any_recent_success_there_is_still_an_answer() -> None:
     assert chosen((0.2, 0, 5, 0.0), (0.8, 0, 5, 0.0)) in (0.2, 0.8)
+
+
+def test_the_middle_is_that_of_the_successes_which_were_seen() -> None:
+    assert chosen((0.75, 10, 3, 0.5), (0.85, 30, 0, 0.5)) == 0.825

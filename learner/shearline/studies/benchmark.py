@@ -6,7 +6,7 @@ A problem is handed in: this knows no function, no simulator and no task.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -110,7 +110,7 @@ class Row:
     """One learner on one problem over many seeds.
 
     Attributes:
-        learner: Its name.
+        learner: Its name, or what was switched.
         problem: The problem's name.
         runs: Number of seeds.
         best: Mean over the runs of the cheapest success.
@@ -129,10 +129,10 @@ class Row:
 
 
 def benchmark(
-    names: Iterable[str],
+    names: Sequence[str],
     problem: Callable[[int], Problem],
     *,
-    seeds: Iterable[int] = range(20),
+    seeds: Sequence[int] = range(20),
     episodes: int = 10,
     episode_length: int = 40,
 ) -> list[Row]:
@@ -151,24 +151,31 @@ def benchmark(
         >>> rows[0].runs
         2
     """
-    listed = list(seeds)
-    return [
-        _row(
+    return [measure(name, name, {}, problem, seeds, episodes, episode_length) for name in names]
+
+
+def measure(
+    label: str,
+    name: str,
+    switches: Mapping[str, object],
+    problem: Callable[[int], Problem],
+    seeds: Sequence[int],
+    episodes: int,
+    episode_length: int,
+) -> Row:
+    """Run one learner, with its switches, from every seed and return its row under a label."""
+    runs = [
+        run_learner(
             name,
-            [
-                run_learner(
-                    name,
-                    problem(seed),
-                    episodes=episodes,
-                    episode_length=episode_length,
-                    seed=seed,
-                )
-                for seed in listed
-            ],
-            problem(listed[0]).name,
+            problem(seed),
+            episodes=episodes,
+            episode_length=episode_length,
+            seed=seed,
+            switches=switches,
         )
-        for name in names
+        for seed in seeds
     ]
+    return _row(label, runs, problem(seeds[0]).name)
 
 
 def _row(name: str, runs: list[Run], problem: str) -> Row:

@@ -68,10 +68,12 @@ class PSPConfig:
     """Switches and numbers of PSP.
 
     Attributes:
-        proposal_min: n_p,min: successes from which the mixture replaces the uniform proposal.
+        proposal_min: n_p,min: successes from which the mixture replaces the uniform proposal;
+            the authors' public code uses 5 for its filter, the paper gives no number.
         filter_min: n_f,min: successes from which the filter is active.
         components_max: n_g: most components the mixture may have; the paper advises 1 to 3.
-        redraws_max: n_s: most proposals per trial.
+        redraws_max: n_s: most proposals per trial; 200 bounds an episode to milliseconds and
+            reaches what 1000 did.
         mixture_data: Samples the mixture is fitted to.
         covariance: Shape of its components.
         covariance_floor: Least standard deviation of a component along any axis, in units of
@@ -82,7 +84,8 @@ class PSPConfig:
         neighbours: Trials around a success that say how reliable it is: its reward becomes the
             one to be expected if it were repeated, failures counting -1. 0 takes every success
             at its word, as the paper does.
-        svm_c: C, the price of a sample on the wrong side.
+        svm_c: C, the price of a sample on the wrong side. The paper wants it high; low, the filter
+            is stricter where good samples are few, and never explodes on contradicting labels.
         balanced: Whether C is weighted inversely to the size of the two classes.
         gammas: Kernel widths tried, as multiples of 12 / n: the value at which two uniformly
             random points of the cube have kernel value e**-2.
@@ -96,7 +99,7 @@ class PSPConfig:
     proposal_min: int = 5
     filter_min: int = 5
     components_max: int = 3
-    redraws_max: int = 1000
+    redraws_max: int = 200
     mixture_data: MixtureData = MixtureData.POSITIVES
     covariance: Covariance = Covariance.DIAGONAL
     covariance_floor: float = 0.01
@@ -104,7 +107,7 @@ class PSPConfig:
     labels: Labels = Labels.NEW
     reward: RewardMap = RewardMap.LINEAR
     neighbours: int = 12
-    svm_c: float = 1e3
+    svm_c: float = 3.0
     balanced: bool = False
     gammas: tuple[float, ...] = (1.0,)
     distance: Distance = Distance.GEOMETRIC
@@ -136,6 +139,7 @@ class PSPConfig:
             mixture_data=MixtureData.SUCCESSES,
             covariance=Covariance.FULL,
             neighbours=0,
+            redraws_max=1000,
             svm_c=1e4,
             gammas=(0.1, 0.18, 0.32, 0.56, 1.0, 1.8, 3.2, 5.6, 10.0),
             distance=Distance.FUNCTIONAL,

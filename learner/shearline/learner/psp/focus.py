@@ -10,13 +10,20 @@ from shearline.learner.ledger import Trials
 from shearline.learner.psp.proposal import Mixture
 from shearline.learner.recommend import ON_POLICY_TRIALS, Focus, clopper_pearson_low
 
+#: Successes from which their own middle is better known than the component's.
+HELD_MIN = 5
+#: Least spread of a focus in units of the cube's edge.
+SCALE_MIN = 0.01
+
 
 def component_focus(mixture: Mixture, trials: Trials) -> Focus:
     """Return the component whose latest trials promise the least cost, judged pessimistically.
 
     A component answers for the recent trials that lie in it. It is judged by the cost to be
     expected at the *lower bound* of its success probability, so that neither one lucky trial nor
-    a cheap fragile corner wins against a component that was tried often and held.
+    a cheap fragile corner wins against a component that was tried often and held. What is
+    returned is the middle of the successes that it had: the mean of the component itself rests
+    on the few cheapest samples, and is a guess at where nothing may have been tried yet.
 
     Args:
         mixture: The proposal policy.
@@ -30,7 +37,10 @@ def component_focus(mixture: Mixture, trials: Trials) -> Focus:
         _promise(recent.where(owner == k), failure_cost) for k in range(len(mixture.weights))
     ]
     best = int(np.argmin(promises))
-    return Focus(mixture.means[best], mixture.deviations[best])
+    held = recent.u[recent.success & (owner == best)]
+    if len(held) < HELD_MIN:
+        return Focus(mixture.means[best], mixture.deviations[best])
+    return Focus(held.mean(axis=0), np.maximum(held.std(axis=0), SCALE_MIN))
 
 
 def _promise(trials: Trials, failure_cost: float) -> float:
