@@ -83,6 +83,7 @@ def test_traces_come_back_as_columns_with_units(
             assert np.array_equal(values, row)
         assert trace.events == tuple(message.events)
     assert run.traces(999) == []
+    assert [trace.token for trace in run.all_traces()] == [message.token for message in said]
 
 
 def test_the_configuration_names_the_parameters(write_run: Callable[..., Path]) -> None:

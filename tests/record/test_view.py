@@ -1,7 +1,9 @@
 """The view is written without a screen, follows a live run, and is a picture of something."""
 
+import errno
 import json
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -108,6 +110,16 @@ def test_without_a_screen_the_way_out_is_said(
         view(write_run())
 
 
+@pytest.mark.slow
+def test_a_screen_that_is_not_there_is_one_clear_error(
+    write_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":4711")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(RecordError, match=r"could not open a window .*--save view.rrd"):
+        view(write_run())
+
+
 def test_a_missing_viewer_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -122,6 +134,15 @@ def test_the_viewer_itself_says_that_its_statistics_are_off() -> None:
     config = json.loads(rerun("analytics", "config"))
     assert config["analytics_enabled"] is False
     assert os.environ == before
+
+
+def test_the_viewer_reaches_no_network_but_this_machine() -> None:
+    with viewer.quiet_environment() as environment:
+        for name in ("HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"):
+            assert environment[name] == environment[name.lower()] == viewer.NOWHERE
+        port = int(viewer.NOWHERE.rsplit(":", 1)[1])
+        with socket.socket() as probe:
+            assert probe.connect_ex(("127.0.0.1", port)) == errno.ECONNREFUSED
 
 
 @pytest.mark.slow

@@ -128,6 +128,12 @@ class Run:
         """
         return [to_trace(_fetch(place)) for place in self._traced.get(trial, [])]
 
+    def all_traces(self) -> Iterator[Trace]:
+        """Yield every trace in order of arrival; far cheaper than asking trial by trial."""
+        for _, message in self.messages(_TRACE):
+            assert isinstance(message, TraceData)
+            yield to_trace(message)
+
     def messages(self, topic: str) -> Iterator[tuple[int, Message]]:
         """Yield ``(log time in ns, message)`` of one topic, part after part.
 

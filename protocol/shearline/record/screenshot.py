@@ -18,10 +18,9 @@ import rerun as rr
 from rerun.experimental import ViewerClient
 
 from shearline.protocol.errors import RecordError
-from shearline.protocol.link import free_endpoint
 from shearline.record.reader import open_run
 from shearline.record.view import APPLICATION, draw, layout_of
-from shearline.record.viewer import quiet_environment
+from shearline.record.viewer import free_port, quiet_environment
 
 #: A picture that has not changed for so many looks is complete ...
 STILL_LOOKS = 3
@@ -85,9 +84,8 @@ def _quiet() -> Iterator[None]:
 
 @contextmanager
 def _headless() -> Iterator[ViewerClient]:
-    port = int(free_endpoint().rsplit(":", 1)[1])
     try:
-        client = ViewerClient.spawn(headless=True, port=port)
+        client = ViewerClient.spawn(headless=True, port=free_port())
     except Exception as error:
         raise RecordError(
             f"a picture needs a graphics driver, a software one will do: {error}"

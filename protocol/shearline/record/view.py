@@ -18,7 +18,7 @@ import rerun.blueprint as rrb
 from shearline.protocol import codec
 from shearline.protocol.errors import ProtocolError
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import discover, free_endpoint, open_client
+from shearline.protocol.link import discover, open_client
 from shearline.protocol.messages import (
     Counted,
     EpisodeClosed,
@@ -33,7 +33,7 @@ from shearline.record.layout import layout
 from shearline.record.picture import Picture
 from shearline.record.reader import Run, Trace, open_run, to_trace
 from shearline.record.topics import RunConfig
-from shearline.record.viewer import viewer
+from shearline.record.viewer import check_ended_well, free_port, viewer
 
 APPLICATION = "shearline"
 #: Traces kept waiting for a slow viewer; older ones are left out of a live view.
@@ -73,7 +73,7 @@ def view(run_dir: Path | str) -> Run:
         path = Path(folder) / "run.rrd"
         run = save(run_dir, path)
         with viewer([str(path)]) as child:
-            child.wait()
+            check_ended_well(child)
     return run
 
 
@@ -87,9 +87,8 @@ def draw(stream: rr.RecordingStream, run: Run) -> Picture:
         picture.episode(episode, last_trial.get(episode.episode))
     for state in run.evaluators:
         picture.evaluator(state)
-    for trial in run.traced():
-        for trace in run.traces(trial):
-            picture.trace(trace)
+    for trace in run.all_traces():
+        picture.trace(trace)
     return picture
 
 
@@ -144,12 +143,12 @@ def view_live(connect: str, run_dir: Path | None = None) -> None:
         LinkError: If no learner is alive at ``connect``.
         RecordError: If there is no viewer or no screen.
     """
-    port = int(free_endpoint().rsplit(":", 1)[1])
+    port = free_port()
     stream = rr.RecordingStream(APPLICATION)
-    with viewer(["--port", str(port)]) as child:
+    with viewer([], port) as child:
         stream.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy")
         follow(connect, stream, closed=lambda: child.poll() is not None, run_dir=run_dir)
-        child.wait()
+        check_ended_well(child)
 
 
 class _Live:
