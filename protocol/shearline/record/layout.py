@@ -13,12 +13,9 @@ import numpy as np
 import numpy.typing as npt
 import rerun.blueprint as rrb
 
-from shearline.record import charts, columns
-from shearline.record.picture import CHARTS
+from shearline.record import charts
+from shearline.record.picture import CHARTS, PLAYED
 from shearline.record.topics import RunConfig
-
-#: Signals with plots of their own while playing.
-PLAYED = columns.FIRST
 
 
 def layout(
@@ -33,7 +30,7 @@ def layout(
 
     Args:
         config: Names and units of the parameters, if known.
-        groups: Names of the groups of columns that traces have.
+        groups: Names of the groups of columns that traces have, first ones first.
         tip: A typical path of the tip ``(samples, 3)`` [m], to look at; ``None`` if there is none.
         in_lock: Whether the tip is given in the lock's frame, z pointing into it.
         active_tab: Which tab stands in front.
@@ -125,12 +122,9 @@ def _parameters(config: RunConfig | None) -> rrb.Container:
 
 
 def _played(groups: Sequence[str], eye: rrb.EyeControls3D | None) -> rrb.Container:
-    plots = [
-        rrb.TimeSeriesView(origin=f"/signals/{name}", name=name)
-        for name in (*(n for n in PLAYED if n in groups), *(g for g in groups if g not in PLAYED))
-    ]
+    plots = [rrb.TimeSeriesView(origin=f"/signals/{name}", name=name) for name in groups[:PLAYED]]
     phases = rrb.StateTimelineView(origin="/phase", name="phase")
-    column = rrb.Vertical(phases, *plots[:6])
+    column = rrb.Vertical(phases, *plots)
     if eye is None:
         return rrb.Vertical(column, name="Played")
     return rrb.Horizontal(column, _space("tip, played", eye), name="Played")

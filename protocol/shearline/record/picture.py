@@ -25,6 +25,8 @@ from shearline.record.topics import RunConfig
 
 #: How many charts of one trial there are room for.
 CHARTS = 4
+#: How many groups of signals are played; the record has all of them.
+PLAYED = 6
 #: Samples of one trial kept for playing: enough to scroll through, 2000 trials stay light.
 PLAYED_SAMPLES = 120
 #: Arrows of force drawn along one path, and their scale [m/N].
@@ -254,7 +256,7 @@ class Picture:
 
     def _play(self, trace: Trace, groups: list[columns.Group], start_s: float) -> None:
         """Lay the trial on the ``played`` timeline: signals, moving tip, phases."""
-        for group in groups:
+        for group in groups[:PLAYED]:
             kept = charts.telling(group.values, PLAYED_SAMPLES)
             values = np.stack([column[kept] for column in group.values], axis=1)
             lengths = [values.shape[1]] * len(values)
