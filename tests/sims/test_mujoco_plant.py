@@ -76,10 +76,9 @@ def test_a_state_that_is_not_physical_ends_the_trial_without_a_verdict() -> None
     plant = MujocoPlant()
     percept = _felt(plant, Setup())
     plant.data.qvel[:7] = 1e12
+    plant.sense(percept)
     with pytest.raises(PlantError, match="no longer physical"):
-        for _ in range(5):
-            plant.sense(percept)
-            plant.step(percept.bias)
+        plant.step(percept.bias)
 
 
 def test_the_engine_names_version_and_model(plant: MujocoPlant) -> None:

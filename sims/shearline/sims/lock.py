@@ -158,7 +158,11 @@ def bitting(key: Key) -> list[Box]:
 def body(key: Key) -> list[Box]:
     """Return what lies under the slabs of the bitting; it is drawn but touches nothing."""
     low, half_x = -key.height_m / 2.0, key.thickness_m / 2.0
-    corners = key.profile()
+    corners = [
+        corner
+        for start, end in itertools.pairwise(key.profile())
+        for corner in (start, _between(start, end))
+    ] + [key.profile()[-1]]
     boxes = []
     for i, ((s0, y0), (s1, y1)) in enumerate(itertools.pairwise(corners)):
         top = min(y0, y1)
@@ -200,6 +204,10 @@ def _slab(name: str, start: tuple[float, float], end: tuple[float, float], half_
     # Its outer normal in (distance, y) is (-rise, run) / length; z is minus the distance.
     centre = (0.0, y - thick * run / length, -(s + thick * rise / length))
     return Box(name, centre, (half_x, thick, length / 2.0), turn_x=math.atan2(rise, run))
+
+
+def _between(start: tuple[float, float], end: tuple[float, float]) -> tuple[float, float]:
+    return ((start[0] + end[0]) / 2.0, (start[1] + end[1]) / 2.0)
 
 
 def _distinct(corners: list[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -135,7 +135,7 @@ def _mjcf(scene: Scene) -> str:
  jacobian="dense" impratio="{s.impratio!r}"/>
 <size memory="8M"/>
 <visual><global offwidth="1280" offheight="960" fovy="35"/><map znear="0.002"/>
-<quality shadowsize="4096"/><headlight ambient=".40 .40 .40" diffuse=".40 .40 .40"/></visual>
+<quality shadowsize="4096"/><headlight ambient=".35 .35 .35" diffuse=".30 .30 .30"/></visual>
 <asset><texture type="skybox" builtin="gradient" rgb1="1 1 1" rgb2=".86 .89 .93" width="64"
  height="384"/></asset>
 <default>
@@ -156,7 +156,7 @@ def _mjcf(scene: Scene) -> str:
  damping="{panda.DAMPING!r}"/></default>
 </default>
 <worldbody>
-<light pos="0.6 -1.2 1.6" dir="-0.05 0.7 -0.8" diffuse=".6 .6 .6"/>
+<light pos="0.6 -1.2 1.6" dir="-0.05 0.7 -0.8" diffuse=".40 .40 .40"/>
 <geom name="floor" class="drawn" type="plane" size="1.5 1.5 0.05" rgba=".90 .91 .92 1"/>
 {_post(believed)}
 <geom class="drawn" type="capsule" fromto="0 0 0 0 0 0.25" size="0.07" rgba=".93 .94 .95 1"/>

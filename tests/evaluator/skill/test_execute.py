@@ -66,7 +66,7 @@ def test_the_heart_beats_in_every_chunk_and_may_end_the_trial(task: KeylockTask)
 
 def test_a_trial_does_not_start_with_the_key_in_the_lock(task: KeylockTask) -> None:
     lock = believed_lock_pose().moved(np.array([0.0, 0.0, -20e-3]), np.zeros(3))
-    with pytest.raises(TrialAborted, match="may not start with the tip 5.0 mm deep"):
+    with pytest.raises(TrialAborted, match=r"may not start with the tip 5\.0 mm deep"):
         execute_compiled(task.plant, Setup(lock=lock), _job(task), lambda: None)
 
 
