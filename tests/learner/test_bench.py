@@ -16,5 +16,5 @@ def test_a_row_for_each_size_and_share_of_flipped_labels() -> None:
 @pytest.mark.bench
 @pytest.mark.slow
 def test_an_update_on_five_times_the_bound_costs_no_more_than_on_the_bound() -> None:
-    rows = measure((2_000, 10_000), "psp", flipped=(0.1,))
+    rows = measure((1_000, 10_000), "psp", flipped=(0.1,))
     assert float(rows[1]["ask_s"]) < 2.0 * float(rows[0]["ask_s"])

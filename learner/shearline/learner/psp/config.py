@@ -113,7 +113,7 @@ class PSPConfig:
     distance: Distance = Distance.GEOMETRIC
     outside: Outside = Outside.REFLECT
     exhausted: Exhausted = Exhausted.LAST
-    fit_samples_max: int = 2000
+    fit_samples_max: int = 1000
 
     def __post_init__(self) -> None:
         _check(self.proposal_min >= 1, "proposal_min", "1 or more", self.proposal_min)
