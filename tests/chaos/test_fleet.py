@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import itertools
 import signal
+from functools import partial
 from pathlib import Path
 
 import pytest
 from chaos.fleet import Fleet
+
+from shearline.protocol.messages import Status
 
 pytestmark = pytest.mark.chaos
 
@@ -24,6 +27,10 @@ RUN = [
     "1",
 ]
 TRIALS = 200
+
+
+def has_counted(trials: int, status: Status) -> bool:
+    return status.counted >= trials
 
 
 def test_a_killed_and_a_frozen_evaluator_cost_nothing_but_time(tmp_path: Path) -> None:
@@ -50,7 +57,7 @@ def test_a_learner_killed_in_mid_run_finishes_with_everything_it_acknowledged(
         learner = fleet.learner()
         evaluators = [fleet.evaluator(name) for name in ("one", "two", "three")]
         for counted in (30, 90):
-            fleet.when(lambda status, enough=counted: status.counted >= enough)
+            fleet.when(partial(has_counted, counted))
             learner.process.kill()
             learner.process.wait()
             before = {one.trial: one for one in fleet.counted()}

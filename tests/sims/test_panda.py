@@ -28,9 +28,7 @@ def test_our_forward_kinematics_are_the_engines(plant: MujocoPlant, q: tuple[flo
     site = plant.model.site("tip").id
     pose = tip_pose(np.array(q))
     np.testing.assert_allclose(plant.data.site_xpos[site], pose.position, atol=1e-12)
-    np.testing.assert_allclose(
-        plant.data.site_xmat[site].reshape(3, 3), pose.rotation, atol=1e-12
-    )
+    np.testing.assert_allclose(plant.data.site_xmat[site].reshape(3, 3), pose.rotation, atol=1e-12)
 
 
 def test_the_arm_weighs_what_was_identified() -> None:

@@ -26,6 +26,8 @@ from shearline.record.recorder import spawn
 
 #: A recorder starts within a second; a run does not wait longer than this for it [s].
 READY_S = 10.0
+#: The last traces arrive within a moment of the run's end [s].
+TRAILING_S = 2.0
 #: How long the recorder may take to write what is left once the run has ended [s].
 FINISH_S = 10.0
 
@@ -60,6 +62,11 @@ def _wait_until_ready(recorder: subprocess.Popen[str]) -> None:
 
 
 def _finish(recorder: subprocess.Popen[str]) -> None:
+    """Let the recorder write what is on its way, then have it end."""
+    try:
+        recorder.wait(TRAILING_S)  # it ends by itself once the end was heard and all is quiet
+    except subprocess.TimeoutExpired:
+        recorder.terminate()
     try:
         recorder.wait(FINISH_S)
     except subprocess.TimeoutExpired:

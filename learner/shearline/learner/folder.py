@@ -102,7 +102,7 @@ def logged_to(path: Path) -> Iterator[None]:
     except OSError as fault:
         raise RecordError(f"cannot write {path}: {fault.strerror}: make room there") from None
     handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
-    handler.handleError = lambda _record: None  # type: ignore[method-assign]
+    handler.handleError = lambda record: None  # type: ignore[method-assign]  # noqa: ARG005
     level = _log.level
     _log.addHandler(handler)
     _log.setLevel(logging.INFO)

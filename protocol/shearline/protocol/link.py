@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 from weakref import WeakSet
 
 from shearline.protocol.codec import BULK_BYTES_MAX
@@ -81,6 +81,14 @@ class Presence:
     alive: bool
 
 
+class Sink(Protocol):
+    """Where a callback may put what came: a queue, or anything that takes without waiting."""
+
+    def put(self, item: Any, /) -> None:
+        """Take one :class:`Arrival` or :class:`Presence`; never block, never raise."""
+        ...
+
+
 class Link:
     """One open session.
 
@@ -121,7 +129,7 @@ class Link:
         """Send bytes that may be dropped, overtake nothing and never make the sender wait."""
         self._session.put(key, payload, congestion_control=self._drop, priority=self._low)
 
-    def subscribe(self, pattern: str, inbox: SimpleQueue[Any]) -> None:
+    def subscribe(self, pattern: str, inbox: Sink) -> None:
         """Put an :class:`Arrival` into ``inbox`` for everything that others send on a pattern.
 
         In the order of each sender; what comes on another subscription may overtake it.
@@ -134,7 +142,7 @@ class Link:
             self._session.declare_subscriber(pattern, enqueue, allowed_origin=self._remote)
         )
 
-    def watch(self, pattern: str, inbox: SimpleQueue[Any]) -> None:
+    def watch(self, pattern: str, inbox: Sink) -> None:
         """Put a :class:`Presence` into ``inbox`` for each token there is, comes or goes."""
 
         def enqueue(sample: zenoh.Sample) -> None:
@@ -144,7 +152,7 @@ class Link:
         self._declared.append(tokens.declare_subscriber(pattern, enqueue, history=True))
 
     @contextmanager
-    def watching(self, pattern: str, inbox: SimpleQueue[Any]) -> Iterator[None]:
+    def watching(self, pattern: str, inbox: Sink) -> Iterator[None]:
         """Like :meth:`watch`, for as long as the block lasts."""
         self.watch(pattern, inbox)
         watcher = self._declared.pop()

@@ -19,8 +19,6 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from queue import SimpleQueue
-from typing import Any, cast
 
 from shearline.protocol import codec
 from shearline.protocol.errors import ProtocolError, ShearlineError
@@ -73,10 +71,8 @@ def record_run(
     seal_all(run_dir)
     inbox = Inbox()
     with open_client(connect, silence_s, cancelled=stopped) as link:
-        # an Inbox is put into exactly as a queue is, and bounds what a queue would not
-        queue = cast("SimpleQueue[Any]", inbox)
-        link.subscribe(Keys(run).observed(), queue)
-        link.watch(Keys(run).live_learners(), queue)
+        link.subscribe(Keys(run).observed(), inbox)
+        link.watch(Keys(run).live_learners(), inbox)
         with RecordWriter(run_dir, config_of(run, run_dir)) as writer:
             inbox.wait_for_learner(HEARD_S)
             ready()

@@ -9,8 +9,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from queue import SimpleQueue
-from typing import Any, cast
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -117,9 +115,8 @@ def follow(
     inbox = Inbox(bulk_bytes_max=LIVE_BULK_BYTES)
     with open_client(connect, timeout_s) as link:
         run, _ = discover(link, timeout_s)
-        queue = cast("SimpleQueue[Any]", inbox)
-        link.subscribe(Keys(run).observed(), queue)
-        link.watch(Keys(run).live_learners(), queue)
+        link.subscribe(Keys(run).observed(), inbox)
+        link.watch(Keys(run).live_learners(), inbox)
         inbox.wait_for_learner(timeout_s)
         so_far = open_run(run_dir) if run_dir else None
         live = _Live(stream, so_far)

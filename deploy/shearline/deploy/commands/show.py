@@ -55,7 +55,7 @@ def view_run(arguments: argparse.Namespace) -> int:
     from shearline.record import view  # noqa: PLC0415 - loads rerun
 
     if arguments.live:
-        view.view_live(arguments.connect)
+        view.view_live(arguments.connect, arguments.run)
         return Exit.OK
     if arguments.run is None:
         raise ConfigError("which run? give its folder, or --live for the one that is going on")
