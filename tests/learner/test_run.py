@@ -317,3 +317,15 @@ def test_a_full_disk_ends_the_run_in_one_sentence_with_nothing_unwritten_acknowl
     summary = run_with(config, tmp_path / "r", endpoint, "b")
     light.join(10.0)
     assert (summary.state, summary.counted) == ("complete", 120)
+
+
+def test_a_torn_journal_is_cut_where_it_is_damaged_and_the_run_goes_on(
+    finished: Path, tmp_path: Path, endpoint: str
+) -> None:
+    folder = tmp_path / "r"
+    folder.mkdir()
+    data = (finished / "journal").read_bytes()
+    (folder / "journal").write_bytes(data[: 2 * len(data) // 3] + b"torn")
+    summary = run_with(CONFIG, folder, endpoint, "a")
+    assert (summary.state, summary.counted) == ("complete", 15)
+    assert "damaged bytes off the end" in (folder / "learner.log").read_text()

@@ -79,6 +79,11 @@ class Folder:
                 " choose another folder, or ask for the same run to resume it"
             )
 
+    def damage(self) -> str:
+        """Say what was cut off the journal's end, or nothing."""
+        torn = self.journal.torn_bytes
+        return f"cut {torn} damaged bytes off the end of {self.journal.path}" if torn else ""
+
     def finish(self, summary: RunSummary) -> None:
         """Write the summary.
 

@@ -6,6 +6,7 @@ enqueue, and fits happen in the fitter's thread.
 
 from __future__ import annotations
 
+import logging
 import secrets
 import sys
 import time
@@ -34,6 +35,8 @@ SWITCH_INTERVAL_S = 0.0005
 #: 128 random bits: nobody guesses the token of an attempt that was not given to them.
 TOKEN_BYTES = 16
 
+_log = logging.getLogger("shearline.learner")
+
 
 def serve(
     config: RunConfig,
@@ -54,7 +57,8 @@ def serve(
         listen: Endpoint for evaluators, e.g. ``"tcp/0.0.0.0:7447"``.
         resume: Insist on there being something to resume.
         on_status: Called in this thread with each status, twice a second.
-        on_listening: Called in this thread once others can connect, before anything happens.
+        on_listening: Called in this thread once the learner is alive to others, before it acts on
+            what they say.
         settings: Further Zenoh settings by path (TLS, access control).
 
     Returns:
@@ -71,13 +75,15 @@ def serve(
     keys = Keys(run_dir.resolve().name)
     started_s = time.monotonic()
     with Folder(run_dir, config, resume=resume) as folder, logged_to(run_dir / "learner.log"):
+        if folder.damage():
+            _log.warning("%s", folder.damage())
         inbox = Inbox()
         with open_router(listen, settings=settings) as link, signals_to(inbox), _switching():
-            if on_listening is not None:
-                on_listening()
             owner = _owner(config, folder, keys, link, inbox, on_status)
             epoch = owner.begin()
             _listen(link, keys, inbox, epoch)
+            if on_listening is not None:
+                on_listening()
             owner.run()
         summary = summarise(
             config,
