@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from shearline.evaluator.keylock import KeylockTask, draw_setup
 from shearline.evaluator.keylock_spec import LEVELS, keylock_spec, level
+from shearline.evaluator.skill.baselines import TUPLES, tuple_of
 from shearline.evaluator.skill.parameters import BOUNDS, space
-from shearline.evaluator.skill.pictures import centre_push
 from shearline.evaluator.task import Outcome, TrialAborted
 from shearline.protocol.errors import ConfigError
 from shearline.sims.lock import Lock
@@ -59,7 +59,7 @@ _CHEATS = [
 
 @pytest.mark.parametrize("cheat", _CHEATS)
 def test_no_known_trick_moves_the_clock(task: KeylockTask, cheat: dict[str, float]) -> None:
-    theta = centre_push(task)
+    theta = tuple_of(TUPLES["centre-push"])
     for name, value in cheat.items():
         theta[list(BOUNDS).index(name)] = value
     _check_cost(task.run(theta, 3, lambda: None))
@@ -105,36 +105,39 @@ def test_the_lock_is_where_the_noise_says() -> None:
 def test_the_same_seed_gives_the_same_trace_in_another_process(task: KeylockTask) -> None:
     code = (
         "from shearline.evaluator.keylock import KeylockTask\n"
-        "from shearline.evaluator.skill.pictures import centre_push\n"
+        "from shearline.evaluator.skill.baselines import TUPLES, tuple_of\n"
         "task = KeylockTask()\n"
-        "print(task.run(centre_push(task), 11, lambda: None).digest)"
+        "print(task.run(tuple_of(TUPLES['centre-push']), 11, lambda: None).digest)"
     )
     found = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.strip()
-    task.run(centre_push(task), 12, lambda: None)  # what ran before must not matter
-    outcome = task.run(centre_push(task), 11, lambda: None)
+    # What ran before must not matter.
+    task.run(tuple_of(TUPLES["centre-push"]), 12, lambda: None)
+    outcome = task.run(tuple_of(TUPLES["centre-push"]), 11, lambda: None)
     assert outcome.digest == found
     assert len(found) == 32
 
 
 def test_another_seed_gives_another_trace(task: KeylockTask) -> None:
-    theta = centre_push(task)
+    theta = tuple_of(TUPLES["centre-push"])
     assert task.run(theta, 1, lambda: None).digest != task.run(theta, 2, lambda: None).digest
 
 
 def test_a_friction_of_one_trial_does_not_leak_into_the_next(task: KeylockTask) -> None:
-    before = task.run(centre_push(task), 6, lambda: None).digest
+    before = task.run(tuple_of(TUPLES["centre-push"]), 6, lambda: None).digest
     jam = KeylockTask("keylock-jam")
     jam._plant = task.plant
-    jam.run(centre_push(task), 6, lambda: None)
-    assert task.run(centre_push(task), 6, lambda: None).digest == before
+    jam.run(tuple_of(TUPLES["centre-push"]), 6, lambda: None)
+    assert task.run(tuple_of(TUPLES["centre-push"]), 6, lambda: None).digest == before
 
 
 def test_lower_limits_can_only_turn_a_trial_into_a_torque_failure(task: KeylockTask) -> None:
     limited = KeylockTask("keylock-limit")
     for seed in range(6):
-        free, strict = (t.run(centre_push(task), seed, lambda: None) for t in (task, limited))
+        free, strict = (
+            t.run(tuple_of(TUPLES["centre-push"]), seed, lambda: None) for t in (task, limited)
+        )
         assert strict.why == "torque" or strict.digest == free.digest
 
 
@@ -146,7 +149,7 @@ def test_a_broken_simulation_has_no_verdict(
 
     monkeypatch.setattr(task.plant, "check", broken)
     with pytest.raises(TrialAborted, match="no longer physical"):
-        task.run(centre_push(task), 0, lambda: None)
+        task.run(tuple_of(TUPLES["centre-push"]), 0, lambda: None)
 
 
 def test_an_unknown_level_is_refused_with_the_known_ones() -> None:

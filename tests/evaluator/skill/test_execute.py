@@ -7,9 +7,9 @@ import pytest
 
 from shearline.evaluator.keylock import KeylockTask
 from shearline.evaluator.skill import manipulation
+from shearline.evaluator.skill.baselines import TUPLES, tuple_of
 from shearline.evaluator.skill.execute import CHUNK_TICKS, Job, execute, execute_compiled
 from shearline.evaluator.skill.physics import random_tuples
-from shearline.evaluator.skill.pictures import centre_push
 from shearline.evaluator.skill.semantic import END, PHASES, SEARCH, SUCCESS, VERDICTS
 from shearline.evaluator.skill.trace import COLUMNS, digest, trace
 from shearline.evaluator.task import TrialAborted
@@ -20,7 +20,7 @@ _COLUMN = {name: i for i, (name, _) in enumerate(COLUMNS)}
 
 
 def _job(task: KeylockTask, **named: float) -> Job:
-    job = task.job(centre_push(task))
+    job = task.job(tuple_of(TUPLES["centre-push"]))
     return job._replace(p=job.p._replace(**named))
 
 

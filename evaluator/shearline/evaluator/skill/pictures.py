@@ -14,6 +14,7 @@ import numpy as np
 
 from shearline.evaluator.keylock import KeylockTask, draw_setup
 from shearline.evaluator.keylock_spec import level
+from shearline.evaluator.skill.baselines import TUPLES, tuple_of
 from shearline.evaluator.task import Array, Trace
 from shearline.protocol.errors import ShearlineError
 from shearline.sims import render
@@ -25,7 +26,6 @@ DEPTHS_M = (-2.5e-3, 6e-3, 13e-3, 24.4e-3)
 
 #: The trial that is shown: the centre of the box with a firm push, a lock that is .5 mm off.
 SEED = 4
-PUSH_N = 19.0
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -48,7 +48,7 @@ def pictures(out: Path) -> list[Path]:
     """Run one trial and write ``keylock-scene.png``, ``keylock-cut.png``, ``keylock-trial.png``."""
     task = KeylockTask()
     setup, _ = draw_setup(level("keylock"), SEED)
-    outcome = task.run(centre_push(task), SEED, lambda: None)
+    outcome = task.run(tuple_of(TUPLES["centre-push"]), SEED, lambda: None)
     assert outcome.trace is not None
     scene, cut, trial = (out / f"keylock-{name}.png" for name in ("scene", "cut", "trial"))
     render.write_png(scene, render.draw_scene(task.plant, setup))
@@ -58,13 +58,6 @@ def pictures(out: Path) -> list[Path]:
     render.write_png(cut, np.concatenate(frames, axis=1))
     _plot(outcome.trace, trial)
     return [scene, cut, trial]
-
-
-def centre_push(task: KeylockTask) -> Array:
-    """Return the centre of the box with a push of 19 N: the baseline of every table."""
-    bounds = task.spec.space
-    centre = {name: (low + high) / 2.0 for name, (_, low, high) in bounds.items()}
-    return np.array(list((centre | {"ins_push": PUSH_N}).values()))
 
 
 def _qpos_at(trace: Trace, depth_m: float) -> Array:
