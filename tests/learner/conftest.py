@@ -1,6 +1,0 @@
-"""Make the dispatcher's lab and the simulation importable by name."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))

@@ -1,6 +1,0 @@
-"""The simulation is a package of modules beside its tests; make it importable by name."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
