@@ -2,8 +2,9 @@
 
 The limit is a bare loop of ``mj_step`` over the same contact states. Both sides run in one process
 on one core, in short slices that take turns, and the thread's CPU time is what counts, so that a
-busy machine slows both alike. In each slice the bare side starts from the very state that the trial has there and applies the torques that the
-trial applies: it goes through the same contacts and solves the same systems, to the last bit.
+busy machine slows both alike. In each slice the bare side starts from the very state that the trial
+has there and applies the torques that the trial applies: it goes through the same contacts and
+solves the same systems, to the last bit.
 """
 
 from __future__ import annotations
