@@ -1,4 +1,8 @@
-"""Real processes of one run, to be hurt: a learner and evaluators as a user would start them."""
+"""Real processes of one run, to be hurt: a learner and evaluators as a user would start them.
+
+When a test fails inside a fleet's block, what the children wrote is added to its failure; when the
+block ends, every process of the fleet is gone, or the test fails for that.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +14,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Self
 
+from chaos.invariants import Audit
+from chaos.relay import Relay
+
 from shearline.deploy.observe import Observer
-from shearline.deploy.processes import Child, end, spawn_command
+from shearline.deploy.processes import Child, end, spawn, spawn_command
+from shearline.learner.dispatcher.entries import AnyEntry
 from shearline.learner.dispatcher.observed import history
 from shearline.learner.journal import read
 from shearline.protocol.link import free_endpoint
@@ -19,6 +27,9 @@ from shearline.protocol.messages import Counted, Message, Status
 
 #: Only decides when a broken run is given up; a sound one never waits for it [s].
 PATIENCE_S = 90.0
+
+#: A recorder whose learner was killed ends with it; this is many times what that takes [s].
+LEAVE_S = 10.0
 
 
 class Fleet:
@@ -33,24 +44,25 @@ class Fleet:
 
     def learner(self, *further: str) -> Child:
         """Start the learner on the run folder; again, if it was killed."""
-        return self._spawn(
-            "learner",
-            [
-                "learner",
-                *self._run,
-                "--listen",
-                self.endpoint,
-                "--out",
-                str(self.run_dir),
-                *further,
-            ],
-        )
+        where = ["--listen", self.endpoint, "--out", str(self.run_dir)]
+        return self._command("learner", ["learner", *self._run, *where, *further])
 
-    def evaluator(self, name: str, *further: str) -> Child:
-        """Start one evaluator."""
-        return self._spawn(
-            name, ["evaluator", "--connect", self.endpoint, "--name", name, *further]
-        )
+    def evaluator(self, name: str, *further: str, through: str = "") -> Child:
+        """Start one evaluator; ``through`` an endpoint other than the learner's."""
+        where = ["--connect", through or self.endpoint, "--name", name]
+        return self._command(name, ["evaluator", *where, *further])
+
+    def script(self, name: str, file: str, *arguments: str) -> Child:
+        """Start a program of this folder, which finds the learner's endpoint first."""
+        path = Path(__file__).with_name(file)
+        log = self.folder / f"{name}.out"
+        return self._kept(spawn(name, [str(path), self.endpoint, *arguments], log))
+
+    def relay(self, name: str) -> Relay:
+        """Start a relay in front of the learner."""
+        relay = Relay(name, self.endpoint, self.folder / f"{name}.out")
+        self._kept(relay.child)
+        return relay
 
     def statuses(self) -> Iterator[Status]:
         """Yield what the learner says of itself until it ends."""
@@ -71,9 +83,18 @@ class Fleet:
         summary: dict[str, Any] = json.loads((self.run_dir / "summary.json").read_text())
         return summary
 
+    def entries(self) -> list[AnyEntry]:
+        """Return what stands in the journal by now."""
+        journal = self.run_dir / "journal"
+        return list(read(journal)) if journal.exists() else []
+
+    def audit(self) -> Audit:
+        """Return the journal of a run that is whole, after it kept every promise."""
+        return Audit(self.entries(), whole=True)
+
     def journal(self) -> list[Message]:
         """Return what the journal says observers should have heard."""
-        return list(history(read(self.run_dir / "journal")))
+        return list(history(self.entries()))
 
     def counted(self) -> list[Counted]:
         """Return every outcome in the journal, in order."""
@@ -82,22 +103,42 @@ class Fleet:
     def said(self) -> str:
         """Return what the children wrote, for people."""
         return "\n".join(
-            f"{c.name}: {c.log.read_text(errors='replace')[-2000:]}" for c in self._children
+            f"{name}: {log.read_text(errors='replace')[-2000:]}"
+            for name, log in {child.name: child.log for child in self._children}.items()
+            if log.exists()
         )
 
-    def _spawn(self, name: str, arguments: list[str]) -> Child:
-        child = spawn_command(name, arguments, self.folder / f"{name}.out")
+    def _command(self, name: str, arguments: list[str]) -> Child:
+        return self._kept(spawn_command(name, arguments, self.folder / f"{name}.out"))
+
+    def _kept(self, child: Child) -> Child:
         self._children.append(child)
         return child
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, _: object, fault: BaseException | None, __: object) -> None:
         for child in self._children:
             if child.returncode is None:
                 child.process.send_signal(signal.SIGCONT)
         end(self._children)
+        for child in self._children:
+            for pipe in (child.process.stdin, child.process.stdout):
+                if pipe is not None:
+                    pipe.close()
+        if fault is not None:
+            fault.add_note(self.said())
+        else:
+            expect_none_left(self.folder)
+
+
+def expect_none_left(folder: Path) -> None:
+    """Assert that no process that mentions a folder outlives what started it by long."""
+    end_s = time.monotonic() + LEAVE_S
+    while left := processes_in(folder):
+        assert time.monotonic() < end_s, left
+        os.sched_yield()
 
 
 def processes_in(folder: Path) -> list[str]:
