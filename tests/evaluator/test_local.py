@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from shearline.evaluator.builtin import BowlTask
 from shearline.evaluator.local import EXTRAS_MAX, objection, run_trial, trace_data
-from shearline.evaluator.task import Array, Outcome, Trace
+from shearline.evaluator.base import Array, Outcome, Trace
 from shearline.protocol.codec import decode, encode
 from shearline.protocol.messages import OutcomeKind, Result, TraceData
 from shearline.protocol.space import Space

@@ -18,7 +18,7 @@ import pytest
 
 from shearline.evaluator.builtin import BowlTask
 from shearline.evaluator.postman import End
-from shearline.evaluator.task import Array, Outcome, Task, Trace, TrialAborted
+from shearline.evaluator.base import Array, Outcome, Task, Trace, TrialAborted
 from shearline.evaluator.tasks import FunctionTask
 from shearline.evaluator.tasks import task as declare
 from shearline.evaluator.worker import Worker, WorkerConfig, default_name, run_worker

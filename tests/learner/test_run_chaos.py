@@ -33,7 +33,7 @@ os._exit(0 if summary.state == "complete" else 4)
 
 EVALUATOR = """
 import os, sys, time
-from shearline.evaluator.task import Outcome
+from shearline.evaluator.base import Outcome
 from shearline.evaluator.worker import WorkerConfig, run_worker
 from shearline.protocol.messages import TaskSpec
 

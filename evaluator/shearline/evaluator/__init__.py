@@ -9,7 +9,7 @@
         return theta["x"] ** 2 + theta["y"] ** 2, True
 """
 
-from shearline.evaluator.task import Outcome, Task, Trace, TrialAborted
+from shearline.evaluator.base import Outcome, Task, Trace, TrialAborted
 from shearline.evaluator.tasks import load_task, task
 
 __all__ = ["Outcome", "Task", "Trace", "TrialAborted", "load_task", "task"]

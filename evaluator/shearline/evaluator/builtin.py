@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from shearline.evaluator.task import Array, Outcome, Task
+from shearline.evaluator.base import Array, Outcome, Task
 from shearline.protocol.errors import ConfigError
 from shearline.protocol.messages import TaskSpec
 
@@ -88,7 +88,7 @@ class BowlTask:
         """Do nothing: there is nothing to load."""
 
     def run(self, theta: Array, seed: int, beat: Callable[[], None]) -> Outcome:  # noqa: ARG002
-        """Sleep in naps, with a beat after each; see :class:`shearline.evaluator.task.Task`."""
+        """Sleep in naps, with a beat after each; see :class:`shearline.evaluator.base.Task`."""
         end_s = time.monotonic() + self._wall_s
         while (left_s := end_s - time.monotonic()) > 0:
             time.sleep(min(left_s, _NAP_S))
@@ -121,7 +121,7 @@ class BenchmarkTask:
         """Do nothing: there is nothing to load."""
 
     def run(self, theta: Array, seed: int, beat: Callable[[], None]) -> Outcome:  # noqa: ARG002
-        """Evaluate the function once; see :class:`shearline.evaluator.task.Task`."""
+        """Evaluate the function once; see :class:`shearline.evaluator.base.Task`."""
         cost, success = self._problem.trial(theta, np.random.default_rng(seed))
         return Outcome(cost=cost, success=success)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shearline.evaluator.base import Array, Outcome, TrialAborted
 from shearline.evaluator.keylock_spec import (
     COST_PER_M,
     ROI_M,
@@ -20,7 +21,6 @@ from shearline.evaluator.keylock_spec import (
     level,
 )
 from shearline.evaluator.skill.parameters import parameters
-from shearline.evaluator.task import Array, Outcome, TrialAborted
 from shearline.protocol.messages import TaskSpec
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class KeylockTask:
         self.run(centre, _WARM_SEED, lambda: None)
 
     def run(self, theta: Array, seed: int, beat: Callable[[], None]) -> Outcome:
-        """Run one trial; see :class:`shearline.evaluator.task.Task`.
+        """Run one trial; see :class:`shearline.evaluator.base.Task`.
 
         Extras: ``depth_m`` and ``insertion_s`` (time since the mouth plane), ``trial_s`` (whole
         trial in its own time), ``offset_m`` and ``tilt_rad`` (how far off the lock really was).

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from shearline.evaluator.task import Outcome, Task, Trace, TrialAborted
+from shearline.evaluator.base import Outcome, Task, Trace, TrialAborted
 from shearline.protocol.messages import OutcomeKind, TraceData, clip
 from shearline.protocol.space import Space
 

@@ -23,8 +23,8 @@ from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 
+from shearline.evaluator.base import Array, Outcome, Task, TrialAborted
 from shearline.evaluator.builtin import builtin_names, builtin_task
-from shearline.evaluator.task import Array, Outcome, Task, TrialAborted
 from shearline.protocol.errors import ConfigError
 from shearline.protocol.messages import TaskSpec
 from shearline.protocol.space import Space

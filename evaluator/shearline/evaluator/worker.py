@@ -20,12 +20,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
+from shearline.evaluator.base import Task, TrialAborted
 from shearline.evaluator.builtin import builtin_task
 from shearline.evaluator.local import Verdict, run_trial, trace_data
 from shearline.evaluator.mail import Beat, Ended, Prepare, Ready, Run, Started
 from shearline.evaluator.mailbox import RENEW_LEASES, Mailbox
 from shearline.evaluator.postman import End, Exchange, Postman
-from shearline.evaluator.task import Task, TrialAborted
 from shearline.evaluator.tasks import FunctionTask
 from shearline.protocol.errors import ConfigError, LinkError
 from shearline.protocol.keys import Keys, check_name

@@ -12,7 +12,7 @@ from shearline.evaluator.skill.execute import CHUNK_TICKS, Job, execute, execute
 from shearline.evaluator.skill.physics import random_tuples
 from shearline.evaluator.skill.semantic import END, PHASES, SEARCH, SUCCESS, VERDICTS
 from shearline.evaluator.skill.trace import COLUMNS, digest, trace
-from shearline.evaluator.task import TrialAborted
+from shearline.evaluator.base import TrialAborted
 from shearline.sims.plant import Setup
 from shearline.sims.scene import Q_START, TICK_S, believed_lock_pose
 

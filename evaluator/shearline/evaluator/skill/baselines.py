@@ -16,10 +16,10 @@ from collections import Counter
 
 import numpy as np
 
+from shearline.evaluator.base import Array
 from shearline.evaluator.keylock import KeylockTask
 from shearline.evaluator.keylock_spec import LEVELS
 from shearline.evaluator.skill.parameters import space
-from shearline.evaluator.task import Array
 
 _SMOOTH = {"xi": 1.1, "ins_k_rot": 40.0, "ins_k_xy": 800.0}
 _WIGGLE = {"wig_a_x": 1.0, "wig_a_y": 3.0, "wig_a_rx": 1.5, "wig_a_ry": 1.5}

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shearline.evaluator.base import TrialAborted
 from shearline.evaluator.skill.control import Arm
 from shearline.evaluator.skill.manipulation import APPROACH_S
 from shearline.evaluator.skill.parameters import Parameters
@@ -30,7 +31,6 @@ from shearline.evaluator.skill.semantic import (
 )
 from shearline.evaluator.skill.skill import State, empty_state, tick
 from shearline.evaluator.skill.trace import COLUMNS, write_row
-from shearline.evaluator.task import TrialAborted
 from shearline.sims.compiled import compiled
 from shearline.sims.mujoco_plant import Handles, MujocoPlant, begin_tick, end_tick
 from shearline.sims.panda import Array

@@ -15,10 +15,10 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
+from shearline.evaluator.base import Array
 from shearline.evaluator.keylock import KeylockTask, draw_setup
 from shearline.evaluator.keylock_spec import level
 from shearline.evaluator.skill.execute import execute_compiled
-from shearline.evaluator.task import Array
 from shearline.sims.mujoco_plant import MujocoPlant
 from shearline.sims.panda import JOINTS, LINKS, link_offset, rotation_x
 from shearline.sims.plant import Setup, empty_percept

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from shearline.evaluator.base import Array, Trace
 from shearline.evaluator.keylock import KeylockTask, draw_setup
 from shearline.evaluator.keylock_spec import level
 from shearline.evaluator.skill.baselines import TUPLES, tuple_of
-from shearline.evaluator.task import Array, Trace
 from shearline.protocol.errors import ShearlineError
 from shearline.sims import render
 from shearline.sims.lock import PINS

@@ -10,9 +10,9 @@ import hashlib
 
 import numpy as np
 
+from shearline.evaluator.base import Trace
 from shearline.evaluator.skill.semantic import PHASES, VERDICTS, Decision
 from shearline.evaluator.skill.skill import State
-from shearline.evaluator.task import Trace
 from shearline.sims.compiled import compiled
 from shearline.sims.lock import PINS
 from shearline.sims.panda import JOINTS, Array
