@@ -76,6 +76,7 @@ class SimEvaluator:
         self.credits = 1 if kind == "robot" else rng.choice((1, 2, 3))
         self.pace_s = math.pow(10.0, rng.uniform(-2, 0.6))
         self.abort_share = rng.choice((0.0, 0.0, 0.1))
+        self.drag = 1.0
         self.alive = False
         self.frozen = False
         self.hung = False
@@ -124,6 +125,10 @@ class SimEvaluator:
         for act in waiting:
             act()
 
+    def hasten(self) -> None:
+        """Run trials at its own pace again."""
+        self.drag = 1.0
+
     def _awake(self, boot: str, act: Callable[[], None]) -> bool:
         """Tell whether this boot may act now; if it is frozen, have it act at the thaw."""
         if not self.alive or boot != self.boot:
@@ -143,26 +148,27 @@ class SimEvaluator:
                 CreditReceived(self.name, Credit(boot=boot, seq=self.seq, credits=self.credits))
             )
         else:
-            self._hello()
+            self._say(HelloReceived(self.name, self.hello(boot)))
         self.clock.after(BEAT_S if self.welcomed else RESEND_S, lambda: self._beat(boot))
 
-    def _hello(self) -> None:
-        hello = Hello(
-            boot=self.boot,
+    def hello(self, boot: str) -> Hello:
+        """Return how a process of this name introduces itself."""
+        return Hello(
+            boot=boot,
             version=VERSION,
             task_digest="",
             kind=self.kind,
             engine="sim",
             credits=self.credits,
         )
-        self._say(HelloReceived(self.name, hello))
 
     def _work(self) -> None:
         if self.running is not None or self.held or not self.queue:
             return
         trial = self.running = self.queue.popleft()
         boot = self.boot
-        wall_s = self.pace_s * self.rng.uniform(0.5, 1.5) * (10 if self.rng.random() < 0.05 else 1)
+        wall_s = self.drag * self.pace_s * self.rng.uniform(0.5, 1.5)
+        wall_s *= 10.0 if self.rng.random() < 0.05 else 1.0
         self.clock.after(wall_s, lambda: self._done(boot, trial))
         self._renew(boot, trial)
 
@@ -248,7 +254,7 @@ class SimEvaluator:
         self.welcomed = False
 
     def _say(self, event: Event) -> None:
-        self.network.carry(self.name, lambda: self._hear(event))
+        self.network.carry(self.name, lambda: self._hear(event), up=True)
 
     def _hear(self, event: Event) -> None:
         assert self.learner is not None

@@ -45,15 +45,25 @@ class Network:
         self.delay_s = math.pow(10.0, rng.uniform(-4, -1))
         self.drop = rng.choice((0.0, 0.05, 0.3))
         self.duplicate = rng.choice((0.05, 0.3))
-        self.cut_off: set[str] = set()
+        #: Evaluators of whom nothing, and to whom nothing, gets through.
+        self.mute: set[str] = set()
+        self.deaf: set[str] = set()
 
-    def carry(self, evaluator: str, arrive: Callable[[], None]) -> None:
-        """Deliver to or from one evaluator: once, twice, later, or never."""
-        if evaluator in self.cut_off or (self.faulty and self.rng.random() < self.drop):
+    def carry(self, evaluator: str, arrive: Callable[[], None], *, up: bool) -> None:
+        """Deliver from (``up``) or to one evaluator: once, twice, later, or never."""
+        if evaluator in (self.mute if up else self.deaf):
+            return
+        if self.faulty and self.rng.random() < self.drop:
             return
         self.clock.after(self._delay_s(), arrive)
         if self.faulty and self.rng.random() < self.duplicate:
             self.clock.after(self._delay_s() * 10.0, arrive)
+
+    def calm(self) -> None:
+        """Lose, double and hold back nothing any more."""
+        self.faulty = False
+        self.mute.clear()
+        self.deaf.clear()
 
     def _delay_s(self) -> float:
         # A heavy tail: now and then a message overtakes many others.

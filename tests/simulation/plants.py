@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 from unittest import mock
 
-from shearline.learner.dispatcher import core, handout, results
+from shearline.learner.dispatcher import core, desk, handout, results
 from shearline.learner.dispatcher.entries import (
     AttemptIssued,
     Entry,
@@ -83,6 +83,16 @@ def _revive_anything(_desk: Any, attempt: Any) -> bool:
     return bool(attempt.state is AttemptState.LAPSED)
 
 
+def _believe_the_clock(desk: Any, now_s: float) -> None:
+    desk.now_s = desk.clock_s = now_s
+
+
+def _copy_to_anyone(desk: Any, attempt: Any, idle: list[Any]) -> None:
+    for evaluator in idle:
+        desk.issue(desk.book.trials[attempt.trial], evaluator, copy=True)
+    idle.clear()
+
+
 def _believe_any_sender(desk: Any, event: Any) -> Verdict:
     attempt = desk.book.attempts.get(event.message.token)
     sender = event.evaluator if attempt is None else attempt.evaluator
@@ -106,4 +116,6 @@ PLANTS: Mapping[str, Plant] = {
     "late results thrown away": Plant({(results, "_VERDICTS"): _KEEP_NOTHING}),
     "handing out after stop": Plant({(handout, "_room"): _room_after_stop}),
     "reviving what was given out again": Plant({(results, "_is_revivable"): _revive_anything}),
+    "the clock believed": Plant({(desk.Desk, "look"): _believe_the_clock}),
+    "copies for anyone": Plant({(handout, "_copy"): _copy_to_anyone}),
 }

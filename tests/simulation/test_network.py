@@ -6,12 +6,16 @@ faults stop, and planted bugs to show that the simulation can fail.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
+from simulation import adversary
 from simulation.plants import NONE, PLANTS, Plant
 from simulation.world import World
 
-#: Runs of the quick suite, in groups that stay below a second.
+#: Runs of the quick suite, in groups that stay well below a second, and of every push.
 QUICK, GROUP = 300, 25
+PUSH, PUSH_GROUP = 2300, 200
 
 #: A planted bug is to be found within so many runs.
 PATIENCE = 500
@@ -39,9 +43,9 @@ def test_every_promise_holds_under_every_fault(first: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(QUICK, 2300, 200))
+@pytest.mark.parametrize("first", range(QUICK, PUSH, PUSH_GROUP))
 def test_every_promise_holds_under_many_more(first: int) -> None:
-    assert_holds(first, first + 200)
+    assert_holds(first, first + PUSH_GROUP)
 
 
 @pytest.mark.parametrize("name", PLANTS)
@@ -57,12 +61,35 @@ def test_a_planted_bug_is_found_by_one_seed_in_a_hundred(name: str) -> None:
     plant = PLANTS[name]
     with plant.planted():
         found = sum(bool(breaks(seed, plant)) for seed in range(PATIENCE))
-    assert found >= PATIENCE / 100
+    assert found >= PATIENCE / 100, f"{name}: {found} of {PATIENCE}"
+
+
+def test_every_fault_strikes(monkeypatch: pytest.MonkeyPatch) -> None:
+    struck: list[str] = []
+
+    def noting(fault: Callable[..., None]) -> Callable[..., None]:
+        def strike(*them: object) -> None:
+            struck.append(fault.__name__)
+            fault(*them)
+
+        return strike
+
+    monkeypatch.setattr(adversary, "_FAULTS", tuple(noting(f) for f in adversary._FAULTS))
+    for seed in range(20):
+        World(seed).run()
+    assert set(struck) == {
+        f"_{name}"
+        for name in (
+            *("kill", "kill_for_good", "freeze", "hang", "slow", "cut", "cut_all"),
+            *("kill_learner", "freeze_learner", "set_clock", "operate", "stop"),
+            *("forge", "lie", "boast", "pose"),
+        )
+    }
 
 
 def test_a_seed_decides_everything() -> None:
     first, again = World(7), World(7)
     first.run()
     again.run()
-    assert first.journal == again.journal
+    assert first.promises.journal == again.promises.journal
     assert list(first.dispatcher.story) == list(again.dispatcher.story)
