@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -72,13 +74,17 @@ def test_a_pin_pushed_in_gives_preload_and_spring_force(plant: MujocoPlant) -> N
     np.testing.assert_allclose(plant.data.qfrc_spring[7:], [expected] * PINS, rtol=1e-9)
 
 
-def test_a_state_that_is_not_physical_ends_the_trial_without_a_verdict() -> None:
+def test_a_state_that_is_not_physical_ends_the_trial_without_a_verdict(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     plant = MujocoPlant()
     percept = _felt(plant, Setup())
     plant.data.qvel[:7] = 1e12
     plant.sense(percept)
     with pytest.raises(PlantError, match="no longer physical"):
         plant.step(percept.bias)
+    assert not list(tmp_path.iterdir())  # MuJoCo left to itself writes a log here
 
 
 def test_the_engine_names_version_and_model(plant: MujocoPlant) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import logging
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +22,8 @@ from shearline.sims.lock import PINS
 from shearline.sims.panda import JOINTS, Array
 from shearline.sims.plant import Percept, PlantError, Setup
 from shearline.sims.scene import Scene, quaternion
+
+_log = logging.getLogger(__name__)
 
 
 class Handles(NamedTuple):
@@ -111,6 +114,16 @@ def end_tick(handles: Handles, tau: Array) -> None:
             h.contact[j] += h.constraint[j]
 
 
+def _quiet() -> None:
+    """Keep MuJoCo from writing MUJOCO_LOG.TXT into whatever folder the user stands in.
+
+    What it warns of ends the trial as a :class:`PlantError` all the same. A handler that somebody
+    has set already stays.
+    """
+    if mujoco.get_mju_user_warning() is None:
+        mujoco.set_mju_user_warning(lambda text: _log.debug("mujoco: %s", text))
+
+
 class MujocoPlant:
     """One simulated arm in front of one lock.
 
@@ -122,6 +135,7 @@ class MujocoPlant:
     """
 
     def __init__(self, scene: Scene | None = None) -> None:
+        _quiet()
         self.scene = scene or Scene()
         text = self.scene.mjcf()
         self.model = mujoco.MjModel.from_xml_string(text)
