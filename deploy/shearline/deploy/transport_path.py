@@ -1,0 +1,260 @@
+"""The full path, measured at the learner: a real run of a task that does nothing.
+
+Owner, dispatcher, journal, codec and session are the ones of every run; only the outgoing
+messages pass a stopwatch.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from shearline.deploy.processes import die_with_parent
+from shearline.deploy.transport_child import Children, report, statistics
+from shearline.deploy.transport_task import WaitTask
+from shearline.learner.base import Learner
+from shearline.learner.config import RunConfig
+from shearline.learner.dispatcher import Dispatcher
+from shearline.learner.fitter import Fitter
+from shearline.learner.folder import Folder, logged_to
+from shearline.learner.inbox import Inbox
+from shearline.learner.ledger import Trials
+from shearline.learner.outgoing import Outgoing
+from shearline.learner.owner import Owner
+from shearline.learner.random_search import RandomSearch
+from shearline.learner.run import SWITCH_INTERVAL_S, TOKEN_BYTES
+from shearline.protocol.keys import Keys
+from shearline.protocol.link import Link, free_endpoint, open_router
+from shearline.protocol.messages import Ack, Message, Trial, Welcome
+
+#: Trials that each evaluator has done before the clock starts.
+WARM = 100
+
+#: Light evaluators of one process.
+CROWD = 64
+
+#: How long nothing is to do, and how much of it settles first [s].
+IDLE_S = 6.0
+SETTLE_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """One trial, from the moment it is handed to the network to the moment its acknowledgement is.
+
+    Attributes:
+        cpu_s: Processor time of the learner's process so far [s].
+    """
+
+    evaluator: str
+    sent_s: float
+    taken_s: float
+    cpu_s: float
+
+
+class Stopwatch(Outgoing):
+    """Outgoing messages, with the time they leave at."""
+
+    def __init__(self, link: Link, keys: Keys, *, record: bool) -> None:
+        super().__init__(link, keys, record=record)
+        self.trips: list[Trip] = []
+        self.welcomed_s: dict[str, float] = {}
+        self._sent_s: dict[str, float] = {}
+
+    def send(self, evaluator: str, message: Message, now_s: float) -> None:
+        """Send to one evaluator."""
+        clock_s = time.perf_counter()
+        if isinstance(message, Trial):
+            self._sent_s[message.token] = clock_s
+        elif isinstance(message, Ack) and message.token in self._sent_s:
+            sent_s = self._sent_s.pop(message.token)
+            self.trips.append(Trip(evaluator, sent_s, clock_s, time.process_time()))
+        elif isinstance(message, Welcome):
+            self.welcomed_s.setdefault(evaluator, clock_s)
+        super().send(evaluator, message, now_s)
+
+
+@dataclass(slots=True)
+class Bench:
+    """One run to be measured.
+
+    Args:
+        config: What is run.
+        endpoint: Where its evaluators find it.
+        run_dir: Its folder, new.
+    """
+
+    config: RunConfig
+    endpoint: str
+    run_dir: Path
+    idle_s: float = 0.0
+    children: Children = field(default_factory=Children)
+    idle: dict[str, float] = field(default_factory=dict)
+    stopwatch: Stopwatch = field(init=False)
+
+    def lead(self, joining: Callable[[], None]) -> list[Trip]:
+        """Lead the run to its end and return its round trips in the order they ended.
+
+        Args:
+            joining: Called once evaluators may join.
+        """
+        keys, inbox = Keys(self.run_dir.name), Inbox()
+        sys.setswitchinterval(SWITCH_INTERVAL_S)
+        with (
+            Folder(self.run_dir, self.config) as folder,
+            logged_to(self.run_dir / "learner.log"),
+            open_router(self.endpoint) as link,
+        ):
+            self.stopwatch = Stopwatch(link, keys, record=False)
+            owner = Owner(
+                self.config,
+                keys.run,
+                Dispatcher(self.config.rules(), lambda: secrets.token_hex(TOKEN_BYTES)),
+                folder.journal,
+                Fitter(self._learner, self.config.seed, inbox),
+                self.stopwatch,
+                inbox,
+            )
+            epoch = owner.begin()
+            for pattern in keys.from_evaluators():
+                link.subscribe(pattern, inbox)
+            link.watch(keys.live_evaluators(), inbox)
+            link.announce(keys.live_learner(epoch))
+            joining()
+            owner.run()
+        return self.stopwatch.trips
+
+    def _learner(self) -> Learner:
+        return Pausing(self)
+
+
+class Pausing(RandomSearch):
+    """Random search that takes its time between two episodes, in which everyone is idle."""
+
+    def __init__(self, bench: Bench) -> None:
+        config = bench.config
+        super().__init__(config.space, config.trials, config.seed)
+        self._bench = bench
+
+    def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
+        super()._begin(episode, trials, rng)
+        if episode == 1:
+            self._bench.idle = _idled(self._bench.children, self._bench.idle_s)
+
+
+def _idled(children: Children, idle_s: float) -> dict[str, float]:
+    """Wait, and return the processor shares of learner and children meanwhile, and their memory."""
+    time.sleep(SETTLE_S)
+    began_s, own_s, theirs_s = time.perf_counter(), time.process_time(), children.cpu_s()
+    time.sleep(idle_s)
+    took_s = time.perf_counter() - began_s
+    return {
+        "idle_learner": (time.process_time() - own_s) / took_s,
+        "idle_evaluators": (children.cpu_s() - theirs_s) / took_s,
+        "memory_bytes": children.memory_bytes(),
+    }
+
+
+def one_by_one(evaluators: int, credits_: int, trials: int, wall_s: float) -> dict[str, float]:
+    """Measure with real evaluators, each a process of its own.
+
+    Returns:
+        ``p50_s``, ``p99_s``, ``rate_hz``, ``cpu_s`` for each trial at the learner, and
+        ``utilisation``: the share of time that trials of ``wall_s`` filled.
+    """
+    config = _config(wall_s, trials, episodes=1)
+    with tempfile.TemporaryDirectory() as folder, Children() as children:
+        bench = Bench(config, free_endpoint(), Path(folder, "bench"))
+
+        def join() -> None:
+            for i in range(evaluators):
+                log = Path(folder, f"evaluator-{i}.log")
+                children.start(
+                    "transport_evaluator", bench.endpoint, f"e{i}", credits_, wall_s, log=log
+                )
+
+        trips = _steady(bench.lead(join), evaluators, evaluators * credits_)
+    took_s = trips[-1].taken_s - trips[0].taken_s
+    rate_hz = (len(trips) - 1) / took_s
+    return statistics([trip.taken_s - trip.sent_s for trip in trips]) | {
+        "rate_hz": rate_hz,
+        "cpu_s": (trips[-1].cpu_s - trips[0].cpu_s) / (len(trips) - 1),
+        "utilisation": rate_hz * wall_s / evaluators,
+    }
+
+
+def crowded(evaluators: int, trials: int) -> dict[str, float]:
+    """Measure with many light evaluators in few processes: two episodes, and idleness between.
+
+    Returns:
+        ``join_s`` (from the word to begin to the last welcome), ``rate_hz`` and ``cpu_s`` of the
+        second episode, ``memory_bytes`` for each evaluator, ``idle_learner`` and
+        ``idle_evaluators`` (shares of a core, all evaluators together).
+    """
+    config = _config(0.0, trials, episodes=2)
+    with tempfile.TemporaryDirectory() as folder, Children() as children:
+        bench = Bench(config, free_endpoint(), Path(folder, "bench"), IDLE_S, children)
+        for first in range(0, evaluators, CROWD):
+            count = min(CROWD, evaluators - first)
+            children.start("transport_evaluator", "crowd", bench.endpoint, "bench", first, count)
+        children.hear()
+        before_bytes = children.memory_bytes()
+        began: list[float] = []
+
+        def join() -> None:
+            began.append(time.perf_counter())
+            children.say("go")
+
+        trips = bench.lead(join)[trials:]
+    joined_s = bench.stopwatch.welcomed_s
+    memory_bytes = bench.idle.pop("memory_bytes") - before_bytes
+    return {
+        "joined": len(joined_s),
+        "join_s": max(joined_s.values()) - began[0],
+        "rate_hz": (len(trips) - 1) / (trips[-1].taken_s - trips[0].sent_s),
+        "cpu_s": (trips[-1].cpu_s - trips[0].cpu_s) / (len(trips) - 1),
+        "memory_bytes": memory_bytes / evaluators,
+        **bench.idle,
+    }
+
+
+def _config(wall_s: float, trials: int, episodes: int) -> RunConfig:
+    return RunConfig(
+        task=WaitTask(wall_s).spec,
+        learner="random",
+        episodes=episodes,
+        trials=trials,
+        speculative=False,
+        record=False,
+    )
+
+
+def _steady(trips: list[Trip], evaluators: int, in_flight: int) -> list[Trip]:
+    """Return the round trips after all evaluators are warm and before the run has to end."""
+    done: Counter[str] = Counter()
+    warm = 0
+    for i, trip in enumerate(trips):
+        done[trip.evaluator] += 1
+        if done[trip.evaluator] == WARM:
+            warm += 1
+        if warm == evaluators:
+            return trips[i : len(trips) - 4 * in_flight]
+    raise RuntimeError(f"expected {evaluators} evaluators to do {WARM} trials each, got {done}")
+
+
+if __name__ == "__main__":
+    die_with_parent()
+    if sys.argv[1] == "crowd":
+        report(crowded(int(sys.argv[2]), int(sys.argv[3])))
+    else:
+        report(one_by_one(*map(int, sys.argv[1:4]), wall_s=float(sys.argv[4])))
+    os._exit(0)
