@@ -13,8 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from shearline.deploy.processes import die_with_parent
+from shearline.evaluator.base import Array, Outcome
 from shearline.evaluator.builtin import builtin_task
-from shearline.evaluator.task import Array, Outcome
 from shearline.evaluator.worker import WorkerConfig, run_worker
 
 

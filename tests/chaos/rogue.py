@@ -9,6 +9,7 @@ is ended. MODE is ``flood``, ``garbage``, ``forge`` or ``all``.
 from __future__ import annotations
 
 import itertools
+import os
 import random
 import secrets
 import sys
@@ -55,10 +56,10 @@ def boots() -> str:
 
 
 def flood(keys: Keys, _: list[str], dice: random.Random) -> Iterator[Said]:
-    """Hellos and heartbeats in our own name and in names nobody has, without end."""
+    """Hellos and heartbeats in our own name and in a few that nobody has, without end."""
     boot = boots()
     for seq in itertools.count():
-        name = dice.choice(["rogue", f"nobody-{dice.randrange(100_000)}"])
+        name = dice.choice(["rogue", f"nobody-{dice.randrange(10)}"])
         hello = Hello(
             boot=boot, version=VERSION + 1, task_digest="", kind="robot", engine="", credits=1
         )
@@ -137,6 +138,7 @@ MODES = {
 
 def main(endpoint: str, run: str, mode: str, names: list[str]) -> None:
     """Do harm for ever."""
+    os.nice(19)  # It stands for another machine: its messages compete with the run, its CPU not.
     keys, dice = Keys(run), random.Random(0)
     heard: SimpleQueue[Arrival] = SimpleQueue()
     with open_client(endpoint, None) as link:

@@ -111,6 +111,7 @@ def test_a_model_becomes_json_whatever_is_in_it() -> None:
 def test_a_flooded_inbox_drops_heartbeats_then_all_arrivals_but_nothing_of_ours(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(inbox, "BACKLOG", 0)
     monkeypatch.setattr(inbox, "HEARTBEATS_MAX", 3)
     monkeypatch.setattr(inbox, "ARRIVALS_MAX", 5)
     box = Inbox()
@@ -122,6 +123,31 @@ def test_a_flooded_inbox_drops_heartbeats_then_all_arrivals_but_nothing_of_ours(
     assert box.qsize() == 5
     box.put("ours")
     assert (box.qsize(), box.dropped) == (6, 15)
+
+
+def test_who_floods_fills_a_share_of_the_inbox_and_the_others_wait_behind_that_alone() -> None:
+    box = Inbox()
+    for _ in range(10_000):
+        box.put(Arrival("r/ev/loud/credit", b""))
+    box.put(Arrival("r/ev/calm/result", b""))
+    assert box.qsize() == inbox.BACKLOG + inbox.SHARE_MAX + 1
+    assert box.dropped == 10_000 - inbox.BACKLOG - inbox.SHARE_MAX
+    while not box.empty():
+        last = box.get()
+    assert last == Arrival("r/ev/calm/result", b"")
+    box.put(Arrival("r/ev/loud/credit", b""))
+    assert box.qsize() == 1
+
+
+def test_senders_are_counted_anew_rather_than_without_bound(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(inbox, "BACKLOG", 0)
+    monkeypatch.setattr(inbox, "SENDERS_MAX", 10)
+    box = Inbox()
+    for name in range(1000):
+        box.put(Arrival(f"r/ev/{name}/credit", b""))
+        assert len(box._shares) <= 10
 
 
 def test_a_pulse_tells_rate_and_percentile() -> None:
