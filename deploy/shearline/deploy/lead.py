@@ -20,6 +20,7 @@ from shearline.learner.journal import read
 from shearline.learner.run import serve
 from shearline.learner.summary import RunSummary
 from shearline.protocol.errors import RecordError
+from shearline.protocol.link import check_endpoint
 from shearline.protocol.messages import Counted, EpisodeClosed
 from shearline.record.complete import complete
 from shearline.record.recorder import spawn
@@ -32,8 +33,20 @@ TRAILING_S = 2.0
 FINISH_S = 10.0
 
 
-def lead(config: RunConfig, run_dir: Path, listen: str, *, resume: bool = False) -> RunSummary:
-    """Lead a run to its end and complete its record; see :func:`shearline.learner.run.serve`."""
+def lead(
+    config: RunConfig,
+    run_dir: Path,
+    listen: str,
+    *,
+    through: str | None = None,
+    resume: bool = False,
+) -> RunSummary:
+    """Lead a run to its end and complete its record; see :func:`shearline.learner.run.serve`.
+
+    ``through`` is the endpoint of a Zenoh router where evaluators may connect as well; it may come
+    later than the learner, and be restarted. A malformed one is a ``LinkError`` too.
+    """
+    settings = {"connect/endpoints": [check_endpoint(through)]} if through else None
     recorder: list[subprocess.Popen[str]] = []
 
     def begin() -> None:
@@ -42,7 +55,9 @@ def lead(config: RunConfig, run_dir: Path, listen: str, *, resume: bool = False)
             _wait_until_ready(recorder[0])
 
     try:
-        summary = serve(config, run_dir, listen, resume=resume, on_listening=begin)
+        summary = serve(
+            config, run_dir, listen, resume=resume, on_listening=begin, settings=settings
+        )
     finally:
         for process in recorder:
             _finish(process)

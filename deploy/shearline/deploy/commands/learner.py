@@ -22,6 +22,11 @@ def register(commands: Subparsers) -> None:
     add_run(command)
     command.add_argument("--listen", default=ENDPOINT, help=f"default {ENDPOINT}")
     command.add_argument(
+        "--through",
+        metavar="ENDPOINT",
+        help="a Zenoh router to connect to, where evaluators may connect as well",
+    )
+    command.add_argument(
         "--resume", action="store_true", help="refuse to begin a new run: there must be one"
     )
     add_json(command)
@@ -34,7 +39,13 @@ def run(arguments: argparse.Namespace) -> int:
     from shearline.deploy.resolve import resolve_run  # noqa: PLC0415 - may import the user's task
 
     asked = resolve_run(arguments)
-    summary = lead(asked.config, asked.run_dir, arguments.listen, resume=arguments.resume)
+    summary = lead(
+        asked.config,
+        asked.run_dir,
+        arguments.listen,
+        through=arguments.through,
+        resume=arguments.resume,
+    )
     if summary.why:
         print(f"shearline: {summary.why}", file=sys.stderr, flush=True)
     if arguments.json:
