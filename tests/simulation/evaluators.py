@@ -46,6 +46,9 @@ BEAT_S = LEASE_S / 2
 RENEW_S = LEASE_S / 4
 RESEND_S = LEASE_S / 4
 
+#: A stubborn evaluator's longest trial; whoever supervises evaluators kills it by then.
+FOREVER_S = 60.0
+
 
 class Learner(Protocol):
     """Where events go."""
@@ -77,6 +80,7 @@ class SimEvaluator:
         self.pace_s = math.pow(10.0, rng.uniform(-2, 0.6))
         self.abort_share = rng.choice((0.0, 0.0, 0.1))
         self.drag = 1.0
+        self.stubborn = rng.random() < 0.3
         self.alive = False
         self.frozen = False
         self.hung = False
@@ -169,7 +173,10 @@ class SimEvaluator:
         boot = self.boot
         wall_s = self.drag * self.pace_s * self.rng.uniform(0.5, 1.5)
         wall_s *= 10.0 if self.rng.random() < 0.05 else 1.0
-        self.clock.after(wall_s, lambda: self._done(boot, trial))
+        # Most notice that a trial takes too long; some go on with it for ever, or nearly so.
+        limit_s = FOREVER_S if self.stubborn else trial.deadline_s + 1.0
+        in_time = wall_s < limit_s
+        self.clock.after(min(wall_s, limit_s), lambda: self._done(boot, trial, in_time))
         self._renew(boot, trial)
 
     def _renew(self, boot: str, trial: Trial) -> None:
@@ -181,15 +188,15 @@ class SimEvaluator:
         self._say(RenewReceived(self.name, Renew(boot=boot, tokens=tokens)))
         self.clock.after(RENEW_S, lambda: self._renew(boot, trial))
 
-    def _done(self, boot: str, trial: Trial) -> None:
-        if not self._awake(boot, lambda: self._done(boot, trial)):
+    def _done(self, boot: str, trial: Trial, in_time: bool) -> None:  # noqa: FBT001 - a fact
+        if not self._awake(boot, lambda: self._done(boot, trial, in_time)):
             return
         if self.hung:
-            self.clock.after(1.0, lambda: self._done(boot, trial))
+            self.clock.after(1.0, lambda: self._done(boot, trial, in_time))
             return
         self.running = None
         kind, cost = verdict_of(trial)
-        if self.rng.random() < self.abort_share:
+        if not in_time or self.rng.random() < self.abort_share:
             kind, cost = OutcomeKind.ABORTED, 0.0
         self.results[trial.token] = Result(
             boot=boot, token=trial.token, trial=trial.trial, kind=kind, cost=cost, seed=trial.seed
