@@ -87,9 +87,9 @@ def test_a_malformed_endpoint_is_refused(capsys: pytest.CaptureFixture[str]) -> 
 @pytest.mark.parametrize(
     "command",
     [
-        ["evaluator", "--patience", "0.2"],
+        ["evaluator"],
         ["status"],
-        ["stop", "--within", "1"],
+        ["stop"],
     ],
     ids=lambda command: command[0],
 )
@@ -98,7 +98,16 @@ def test_no_learner_there_is_exit_code_3(command: list[str]) -> None:
         nobody.bind(("127.0.0.1", 0))  # bound, not listening: refuses
         endpoint = f"tcp/127.0.0.1:{nobody.getsockname()[1]}"
         done = subprocess.run(
-            [sys.executable, "-m", "shearline.deploy", *command, "--connect", endpoint],
+            [
+                sys.executable,
+                "-m",
+                "shearline.deploy",
+                *command,
+                "--connect",
+                endpoint,
+                "--patience",
+                "0.2",
+            ],
             capture_output=True,
             text=True,
             timeout=30,

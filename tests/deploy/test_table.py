@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
@@ -41,6 +41,7 @@ def test_losses_are_shown_only_when_there_are_some() -> None:
     assert "2 lost, 1 duplicates" in drawn(status(lost=2, duplicates=1)).splitlines()[0]
 
 
+@settings(max_examples=20)  # each draws a whole page
 @given(episodes=st.integers(0, 40), evaluators=st.integers(0, 300))
 def test_the_table_stays_on_a_screen_however_long_the_run(episodes: int, evaluators: int) -> None:
     history = [

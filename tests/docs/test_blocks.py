@@ -23,6 +23,11 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 HOLDS_TERMINAL = re.compile(r"^(shearline (?:learner|evaluator) [^&\n]*[^&\s])\s*$", re.MULTILINE)
 PATIENCE_S = 120
+#: Pages whose Python needs more around it than a folder, and the tests that run it.
+PYTHON_ELSEWHERE = {
+    "protocol": ROOT / "tests" / "protocol" / "test_docs.py",
+    "record": ROOT / "tests" / "record" / "test_docs.py",
+}
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:
@@ -64,6 +69,8 @@ def test_the_blocks_of_a_page_work_as_written(page: Path, tmp_path: Path) -> Non
         match language:
             case "sh" if not text.startswith("make "):
                 run(["bash", "-c", script(text, port)], tmp_path)
+            case "python" if page.stem in PYTHON_ELSEWHERE:
+                assert PYTHON_ELSEWHERE[page.stem].exists()
             case "python":
                 (tmp_path / "block.py").write_text(text)
                 run([sys.executable, "block.py"], tmp_path)

@@ -7,6 +7,7 @@ by the command that needs it, when it runs.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 
 from shearline.deploy.commands import bench, doctor, evaluator, learner, operate, show, study, up
@@ -23,9 +24,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     die_with_parent()
     arguments = parser().parse_args(argv)
     try:
-        return int(arguments.handler(arguments))
+        code = int(arguments.handler(arguments))
+        sys.stdout.flush()  # here, where a reader that left is no error
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - complain() re-raises bugs
         return int(complain(error))
+    return code
 
 
 def parser() -> argparse.ArgumentParser:

@@ -49,8 +49,15 @@ def add_json(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", action="store_true", help="print JSON for programs")
 
 
-def add_connect(command: argparse.ArgumentParser) -> None:
-    """``--connect``: the learner's endpoint."""
+def add_connect(command: argparse.ArgumentParser, *, patience_s: float = 5.0) -> None:
+    """``--connect``: the learner's endpoint, and ``--patience``: how long to look for it."""
+    command.add_argument(
+        "--patience",
+        type=seconds,
+        default=patience_s,
+        metavar="S",
+        help=f"look for a learner for at most S seconds (default {patience_s:g})",
+    )
     command.add_argument(
         "--connect",
         default=ENDPOINT,

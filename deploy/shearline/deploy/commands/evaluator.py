@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 
-from shearline.deploy.options import Subparsers, add_connect, positive, seconds
+from shearline.deploy.options import Subparsers, add_connect, positive
 
 
 def register(commands: Subparsers) -> None:
@@ -16,18 +16,11 @@ def register(commands: Subparsers) -> None:
         help="run trials for a learner",
         description="Run trials for a learner until the run ends; outlives its restarts.",
     )
-    add_connect(command)
+    add_connect(command, patience_s=10.0)
     command.add_argument("--name", help="unique name in the run (default HOST-PID)")
     command.add_argument("--task", help="your own task, file:function (default: the learner's)")
     command.add_argument("--plant", choices=("mujoco",), default="mujoco", help="what to act on")
     command.add_argument("--credits", type=positive, default=2, help="trials held at once")
-    command.add_argument(
-        "--patience",
-        type=seconds,
-        default=10.0,
-        metavar="S",
-        help="wait at most S seconds for a learner at the start (default 10)",
-    )
     command.add_argument("--forever", action="store_true", help="wait for the next run too")
     command.add_argument("--no-traces", action="store_true", help="send no traces to the record")
     command.set_defaults(handler=run)

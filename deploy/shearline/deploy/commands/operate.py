@@ -38,7 +38,7 @@ def show_status(arguments: argparse.Namespace) -> int:
 
     from shearline.deploy.observe import Observer  # noqa: PLC0415 - loads zenoh
 
-    with Observer.attach(arguments.connect) as observer:
+    with Observer.attach(arguments.connect, timeout_s=arguments.patience) as observer:
         status = observer.status()
     if arguments.json:
         print(msgspec.json.encode(status).decode())
@@ -59,7 +59,7 @@ def steer(arguments: argparse.Namespace) -> int:
 
     wanted = COMMANDS[arguments.command][0]
     until_s = time.monotonic() + arguments.within
-    with Observer.attach(arguments.connect) as observer:
+    with Observer.attach(arguments.connect, timeout_s=arguments.patience) as observer:
         run = observer.keys.run
         while time.monotonic() < until_s:
             # Said again until it is seen to work: a put is never acknowledged.
