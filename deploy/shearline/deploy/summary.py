@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -44,8 +45,13 @@ def print_summary(summary: Mapping[str, Any], run_dir: Path, units: Mapping[str,
         console.print(f"stopped: {summary['why']}; the same command with --out {run_dir} goes on")
     if summary.get("recommendation"):
         console.print(_recommendation(summary["recommendation"], units))
-    console.print("\nlook at it   ", f"shearline view {run_dir}", soft_wrap=True)
-    console.print("its trials   ", f"shearline trials {run_dir} --json", soft_wrap=True)
+    console.print(f"\nreplay it in Rerun   {_ourselves()} view {run_dir}", soft_wrap=True)
+    console.print(f"list its trials      {_ourselves()} trials {run_dir} --json", soft_wrap=True)
+
+
+def _ourselves() -> str:
+    """Return what a person here types to run this program."""
+    return "shearline" if shutil.which("shearline") else sys.argv[0]
 
 
 def _episodes(summary: Mapping[str, Any]) -> Table:
