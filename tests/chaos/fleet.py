@@ -10,12 +10,13 @@ import json
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from typing import Any, Self
 
 from chaos.invariants import Audit
 from chaos.relay import Relay
+from chaos.witness import Witness
 
 from shearline.deploy.observe import Observer
 from shearline.deploy.processes import Child, end, spawn, spawn_command
@@ -41,6 +42,7 @@ class Fleet:
         self.endpoint = free_endpoint()
         self._run = run
         self._children: list[Child] = []
+        self._links: list[Witness] = []
 
     def learner(self, *further: str) -> Child:
         """Start the learner on the run folder; again, if it was killed."""
@@ -52,17 +54,23 @@ class Fleet:
         where = ["--connect", through or self.endpoint, "--name", name]
         return self._command(name, ["evaluator", *where, *further])
 
-    def script(self, name: str, file: str, *arguments: str) -> Child:
-        """Start a program of this folder, which finds the learner's endpoint first."""
+    def script(self, name: str, file: str, *arguments: str, at: str = "") -> Child:
+        """Start a program of this folder; its first argument is an endpoint, the learner's."""
         path = Path(__file__).with_name(file)
         log = self.folder / f"{name}.out"
-        return self._kept(spawn(name, [str(path), self.endpoint, *arguments], log))
+        return self._kept(spawn(name, [str(path), at or self.endpoint, *arguments], log))
 
     def relay(self, name: str) -> Relay:
         """Start a relay in front of the learner."""
         relay = Relay(name, self.endpoint, self.folder / f"{name}.out")
         self._kept(relay.child)
         return relay
+
+    def witness(self) -> Witness:
+        """Have what evaluators are told from now on overheard, once there is a learner."""
+        witness = Witness(self.endpoint, self.run_dir.name)
+        self._links.append(witness)
+        return witness
 
     def statuses(self) -> Iterator[Status]:
         """Yield what the learner says of itself until it ends."""
@@ -80,6 +88,10 @@ class Fleet:
         """Wait for the learner to end and return its summary."""
         code = learner.process.wait(PATIENCE_S)
         assert code == 0, self.said()
+        return self.summary()
+
+    def summary(self) -> dict[str, Any]:
+        """Return the summary of a run that has ended."""
         summary: dict[str, Any] = json.loads((self.run_dir / "summary.json").read_text())
         return summary
 
@@ -87,6 +99,11 @@ class Fleet:
         """Return what stands in the journal by now."""
         journal = self.run_dir / "journal"
         return list(read(journal)) if journal.exists() else []
+
+    def rate_hz(self, names: Collection[str], from_s: float, to_s: float) -> float:
+        """Return how fast some evaluators' results were counted between two moments [1/s]."""
+        told = [c.at_s for c in self.counted() if c.evaluator in names]
+        return sum(from_s <= at_s < to_s for at_s in told) / (to_s - from_s)
 
     def audit(self) -> Audit:
         """Return the journal of a run that is whole, after it kept every promise."""
@@ -122,6 +139,8 @@ class Fleet:
         for child in self._children:
             if child.returncode is None:
                 child.process.send_signal(signal.SIGCONT)
+        for link in self._links:
+            link.close()
         end(self._children)
         for child in self._children:
             for pipe in (child.process.stdin, child.process.stdout):
@@ -131,6 +150,11 @@ class Fleet:
             fault.add_note(self.said())
         else:
             expect_none_left(self.folder)
+
+
+def counts(trials: int) -> Callable[[Status], bool]:
+    """Return the condition that so many trials are counted."""
+    return lambda status: status.counted >= trials
 
 
 def expect_none_left(folder: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from queue import Empty, SimpleQueue
-from typing import Self
 
 from shearline.protocol.codec import decode
 from shearline.protocol.errors import ProtocolError
@@ -43,8 +42,6 @@ class Witness:
             if isinstance(message, Ack | Trial):
                 messages.append(message)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """Stop listening."""
         self._link.close()

@@ -1,0 +1,61 @@
+"""A client that floods, talks garbage and forges has no effect but the noise it makes.
+
+It has no token that was not overheard, and sends nothing well-formed that would need one. What
+only access control can stop (orders in the operator's name, evaluators without number that take
+trials and never answer) is not tried here.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from chaos.fleet import Fleet, counts
+from chaos.rogue import FORGED_COST
+
+from shearline.learner.dispatcher.entries import AttemptLapsed, ResultTaken
+from shearline.protocol.messages import Status
+
+pytestmark = pytest.mark.chaos
+
+NAMES = ("one", "two", "three")
+RUN = [
+    "--task", "sleep-40", "--learner", "lhs", "--episodes", "4", "--trials", "40",
+    "--lease", "2", "--no-record",
+]  # fmt: skip
+
+#: What the longest step may take [ms], and what a machine with other work may add to it: a step
+#: is measured by the wall, and whoever waits for a core in mid-step shows there.
+STEP_MS_MAX = 50.0
+BUSY_MS = 450.0
+
+
+def is_over(status: Status) -> bool:
+    return status.state == "ended"
+
+
+@pytest.mark.parametrize("mode", ["flood", "garbage", "forge", "all"])
+def test_a_rogue_has_no_effect(tmp_path: Path, mode: str) -> None:
+    with Fleet(tmp_path, RUN) as fleet:
+        learner = fleet.learner()
+        for name in NAMES:
+            fleet.evaluator(name)
+        fleet.when(counts(5))
+        rogue = fleet.script("rogue", "rogue.py", "run", mode, *NAMES)
+        last = fleet.when(is_over)
+        assert rogue.returncode is None, "the rogue died before the run ended"
+        fleet.outcome(learner)
+        audit = fleet.audit()
+        entries = fleet.entries()
+        assert FORGED_COST not in {result.cost for result in audit.counted.values()}
+        assert {e.evaluator for e in entries if isinstance(e, ResultTaken)} <= set(NAMES)
+        assert {e.evaluator for e in last.evaluators} == set(NAMES)
+        assert not [e for e in entries if isinstance(e, AttemptLapsed)]
+        log = (fleet.run_dir / "learner.log").read_text()
+        assert len(log) < 100_000
+        noise = re.search(r"malformed (\d+), dropped (\d+)", log)
+        assert noise is not None
+        if mode in {"garbage", "all"}:
+            assert int(noise[1]) > 100
+        assert last.step_ms_max < STEP_MS_MAX + BUSY_MS
