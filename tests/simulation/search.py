@@ -1,9 +1,9 @@
 """Every state of a small world, breadth first, so that what breaks is shown by the shortest path.
 
 ``PYTHONPATH=tests python -m simulation.search`` looks at the small world of three trials and says
-how many states there are (``whole``: with an evaluator that dies as well). States are told apart by a 64-bit hash of all that can decide what follows:
-times count from now, tokens are named by trial and attempt. With ten million states the chance
-that any two share a hash is below one in three hundred thousand.
+how many states there are (``whole``: with an evaluator that dies as well). States are told apart
+by a 64-bit hash of all that can decide what follows. With ten million states the chance that any
+two share a hash is below one in three hundred thousand.
 """
 
 from __future__ import annotations
