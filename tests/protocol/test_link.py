@@ -187,7 +187,9 @@ def test_a_client_finds_the_next_learner_by_itself() -> None:
         assert client.is_connected()
         first.close()
         assert seen.get(timeout=WAIT_S) == Presence(KEYS.live_learner(1), alive=False)
-        assert not client.is_connected()
+        end_s = time.monotonic() + WAIT_S
+        while client.is_connected():  # known a moment after the token is
+            assert time.monotonic() < end_s
         client.publish(KEYS.all_cmd(), b"lost without an error")
         with open_router(endpoint) as second:
             second.announce(KEYS.live_learner(2))

@@ -86,6 +86,15 @@ def test_one_flipped_bit_costs_at_most_what_it_hit_and_is_said(
     assert run.damage or len(run.proposed) == TRIALS
 
 
+@pytest.mark.parametrize("opcode", [Opcode.DATA_END, Opcode.FOOTER])
+def test_a_chunk_that_poses_as_the_end_is_said(whole: Path, tmp_path: Path, opcode: Opcode) -> None:
+    damaged = bytearray(whole.read_bytes())
+    chunks = [frame for frame in frames(io.BytesIO(damaged)) if frame.opcode == Opcode.CHUNK]
+    damaged[chunks[5].offset] = opcode
+    (tmp_path / "record.mcap").write_bytes(damaged)
+    assert open_run(tmp_path).damage
+
+
 def test_a_whole_part_is_left_alone(whole: Path, tmp_path: Path) -> None:
     path = tmp_path / "record.mcap"
     path.write_bytes(whole.read_bytes())

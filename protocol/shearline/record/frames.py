@@ -26,6 +26,10 @@ HEAD = struct.Struct("<BQ")
 #: No frame of ours comes near: a chunk closes at 1 MiB and a trace is capped on the wire.
 FRAME_BYTES_MAX = 256 * 2**20
 
+#: Exact length of the records that end a file [bytes]: a chunk whose opcode lost a bit must not
+#: pass for one, or all behind it would be missing without a word.
+ENDINGS = {int(Opcode.DATA_END): 4, int(Opcode.FOOTER): 20}
+
 #: What the libraries below raise for damaged bytes: lz4 a RuntimeError, mcap a ValueError for a
 #: wrong checksum, and lengths that are nonsense end in the last two.
 _DAMAGE = (
@@ -83,7 +87,7 @@ def frame_at(file: BinaryIO, offset: int) -> Frame:
     """Return the whole frame that begins at ``offset``.
 
     Raises:
-        RecordError: If the file ends before the frame does.
+        RecordError: If the file ends before the frame does, or it poses as an ending.
     """
     file.seek(offset)
     head = file.read(HEAD.size)
@@ -93,6 +97,8 @@ def frame_at(file: BinaryIO, offset: int) -> Frame:
     payload = file.read(length)
     if len(payload) < length:
         raise RecordError(f"it breaks off at byte {offset}")
+    if length != ENDINGS.get(opcode, length):
+        raise RecordError(f"the record at byte {offset} is damaged (an ending of {length} bytes)")
     return Frame(offset, opcode, payload)
 
 

@@ -36,6 +36,11 @@ def positives(trials: Trials, threshold_cost: float) -> npt.NDArray[np.bool_]:
     return trials.success & (trials.cost <= threshold_cost)
 
 
+def _has_inverses(cost: Array) -> bool:
+    """Tell whether every cost is positive and its reciprocal still a number."""
+    return bool(np.all(cost >= np.finfo(np.float64).tiny * 4.0))
+
+
 def mean_cost(cost: Array, reward: RewardMap) -> float:
     """Return the cost that earns the mean reward of costs ``(k,)``, k >= 1.
 
@@ -44,7 +49,7 @@ def mean_cost(cost: Array, reward: RewardMap) -> float:
         reward: The map; the reciprocal one falls back to the linear one unless all costs are
             positive.
     """
-    if reward is RewardMap.RECIPROCAL and bool(np.all(cost > 0)):
+    if reward is RewardMap.RECIPROCAL and _has_inverses(cost):
         mean = float(1.0 / np.mean(1.0 / cost))
     else:
         mean = float(np.mean(cost))
@@ -130,7 +135,7 @@ def rewards(trials: Trials, reward: RewardMap) -> Array:
     won = trials.cost[trials.success]
     if not len(won):
         return result
-    if reward is RewardMap.RECIPROCAL and bool(np.all(won > 0)):
+    if reward is RewardMap.RECIPROCAL and _has_inverses(won):
         result[trials.success] = 1.0 / won
         return result
     span = float(won.max() - won.min())
