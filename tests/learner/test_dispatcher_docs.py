@@ -3,24 +3,37 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from shearline.learner.dispatcher.states import ATTEMPT, RUN, TRIAL, Table
+from shearline.learner.dispatcher.diagram import TABLES, main, mermaid
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "dispatcher.md"
 
 
-def render(table: Table[Any, Any]) -> str:
-    """Return a table as Markdown, one row for each state."""
-    rows = [
-        f"| **{state}** | {', '.join(f'{c} → {s}' for c, s in row.items()) or 'nothing'} |"
-        for state, row in table.items()
+@pytest.mark.parametrize("name", TABLES)
+def test_the_page_shows_the_table_that_the_program_uses(name: str) -> None:
+    assert f"```mermaid\n{mermaid(TABLES[name])}\n```" in PAGE.read_text()
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_the_page_says_what_every_state_means(name: str) -> None:
+    text = PAGE.read_text()
+    assert all(f"**{state}**" in text for state in TABLES[name])
+
+
+def test_a_diagram_has_an_arrow_for_every_transition() -> None:
+    table = {"a": {"x": "b", "y": "b", "z": "a"}, "b": {}}
+    assert mermaid(table).splitlines() == [
+        "stateDiagram-v2",
+        "    [*] --> a",
+        "    a --> b: x, y",
+        "    a --> a: z",
+        "    b --> [*]",
     ]
-    return "\n".join(["| state | what leads where |", "| --- | --- |", *rows])
 
 
-@pytest.mark.parametrize("table", [RUN, TRIAL, ATTEMPT], ids=["RUN", "TRIAL", "ATTEMPT"])
-def test_the_page_shows_the_table_that_the_program_uses(table: Table[Any, Any]) -> None:
-    assert render(table) in PAGE.read_text()
+def test_the_command_prints_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
+    main()
+    printed = capsys.readouterr().out
+    assert all(f"%% {name}\n{mermaid(table)}" in printed for name, table in TABLES.items())
