@@ -50,6 +50,16 @@ def test_who_does_not_fit_is_refused_and_told_why(changes: dict[str, Any], why: 
     assert len(lab.dispatcher.desk.roster) == 0
 
 
+@pytest.mark.parametrize(("kind", "welcome"), [("simulator", True), ("robot", False)])
+def test_a_run_takes_only_the_kinds_it_was_configured_for(kind: str, *, welcome: bool) -> None:
+    lab = Lab(kinds=("simulator", "function"))
+    out = lab.hello("a", kind=kind)
+    assert bool(sent(out, Welcome)) == welcome
+    if not welcome:
+        (refused,) = sent(out, Refused)
+        assert "expected an evaluator of kind simulator or function, got 'robot'" in refused.why
+
+
 def test_a_task_that_turns_out_another_once_it_is_warm_is_refused() -> None:
     lab = Lab()
     lab.hello("a", credits=0)

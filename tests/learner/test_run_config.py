@@ -31,7 +31,7 @@ def test_toml_reads_back_to_the_same_value_and_digest(
     low: float, width: float, lease_s: float, seed: int, unit: str
 ) -> None:
     task = TaskSpec(name="t", space={"x": (unit, low, low + width)}, options={"a": low})
-    config = RunConfig(task=task, seed=seed, lease_s=lease_s)
+    config = RunConfig(task=task, seed=seed, lease_s=lease_s, kinds=("function", "robot"))
     again = from_toml(to_toml(config))
     assert again == config
     assert digest(again.task) == digest(task)
@@ -59,6 +59,7 @@ def test_a_task_may_be_named_where_someone_knows_it() -> None:
         ("lease_s = nan", r"at `\$.lease_s`"),
         ("epsiodes = 3", "epsiodes"),
         ("seed = -1", r"at `\$.seed`"),
+        ('kinds = ["simulater"]', r"at `\$.kinds"),
         ("episodes = ", "expected TOML"),
     ],
 )
@@ -92,8 +93,9 @@ def test_what_makes_it_another_run_is_named(changes: dict[str, object], named: s
 
 
 def test_the_rules_are_those_of_the_configuration() -> None:
-    rules = RunConfig(task=TASK, losses_max=7, quorum=0.5).rules()
+    rules = RunConfig(task=TASK, losses_max=7, quorum=0.5, kinds=("robot",)).rules()
     assert (rules.task, rules.losses_max, rules.quorum) == (TASK, 7, 0.5)
+    assert rules.kinds == ("robot",)
 
 
 @given(seed=st.integers(0, 2**63 - 1), trial=st.integers(0, 10**9))

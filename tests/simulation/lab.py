@@ -58,7 +58,7 @@ class Lab:
         rules: Further rules.
     """
 
-    def __init__(self, trials: int = 4, episodes: int = 2, **rules: float) -> None:
+    def __init__(self, trials: int = 4, episodes: int = 2, **rules: object) -> None:
         self.rules = Rules(TASK, episodes, trials, LEASE_S, **rules)  # type: ignore[arg-type]
         self.now_s = 1000.0
         self.journal: list[Entry] = []

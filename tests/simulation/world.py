@@ -37,8 +37,9 @@ from shearline.learner.dispatcher.instructions import (
 from shearline.protocol.messages import Ack, CommandKind, Message, TaskSpec, Trial
 
 FAULTS_S = 12.0
-#: Far beyond what any run needs once faults stop: a minute of rest, three losses of each trial.
-PATIENCE_S = 400.0
+#: Far beyond what any run needs once faults stop: a minute of rest, and sixty trials of half a
+#: minute on one slow evaluator (seed 48663 of an earlier version took 420 s).
+PATIENCE_S = 2000.0
 TICK_S = LEASE_S / 8
 TASK = TaskSpec(name="sim", space={"x": ("", 0.0, 1.0)}, trial_s=8.0)
 

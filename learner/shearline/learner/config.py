@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 import tomli_w
@@ -40,6 +40,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         losses_max: Attempts of one trial that may lapse before it counts as lost.
         aborts_max: Attempts of one trial that may be aborted or rejected before it does.
         stop_grace_s: How long a stop waits for what runs [s].
+        kinds: Kinds of evaluators that may take part; all if empty.
         record: Whether the run is recorded beside its journal.
         durable: Whether an acknowledged result survives a power cut, not only the process: each
             step of the learner then waits for the disk.
@@ -57,6 +58,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     losses_max: Annotated[int, Meta(ge=1, le=50)] = 3
     aborts_max: Annotated[int, Meta(ge=1, le=50)] = 3
     stop_grace_s: Annotated[float, Meta(ge=0.0, le=3600.0)] = 5.0
+    kinds: tuple[Literal["simulator", "function", "robot"], ...] = ()
     record: bool = True
     durable: bool = False
 
@@ -82,6 +84,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             losses_max=self.losses_max,
             aborts_max=self.aborts_max,
             stop_grace_s=self.stop_grace_s,
+            kinds=self.kinds,
         )
 
 

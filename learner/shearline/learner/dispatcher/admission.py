@@ -133,6 +133,11 @@ def _objection(desk: Desk, message: Hello) -> str:
             f"expected task {task.name!r} with digest {digest(task)}, got {message.task_digest}:"
             " start learner and evaluator with the same task, bounds and options"
         )
+    if desk.rules.kinds and message.kind not in desk.rules.kinds:
+        return (
+            f"expected an evaluator of kind {' or '.join(desk.rules.kinds)}, got {message.kind!r}:"
+            " this run was configured to take no other"
+        )
     return ""
 
 

@@ -46,6 +46,7 @@ class Rules:
         losses_max: A trial whose attempts lapsed so often is lost.
         aborts_max: A trial aborted or rejected so often is lost.
         stop_grace_s: How long a stop waits for what runs [s].
+        kinds: Kinds of evaluators that may take part; all if empty.
     """
 
     task: TaskSpec
@@ -58,3 +59,4 @@ class Rules:
     losses_max: int = 3
     aborts_max: int = 3
     stop_grace_s: float = 5.0
+    kinds: tuple[str, ...] = ()
