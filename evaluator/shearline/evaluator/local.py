@@ -49,7 +49,11 @@ class Verdict:
 
 
 def run_trial(
-    task: Task, theta: npt.ArrayLike, seed: int, beat: Callable[[], None] = lambda: None
+    task: Task,
+    theta: npt.ArrayLike,
+    seed: int,
+    beat: Callable[[], None] = lambda: None,
+    space: Space | None = None,
 ) -> Verdict:
     """Run one trial and return how it ended; no mistake of a task or of a sender escapes.
 
@@ -58,8 +62,9 @@ def run_trial(
         theta: The tuple ``(n,)`` in task units, checked against the task's bounds here.
         seed: 0 to 2**63 - 1.
         beat: Handed to the task; what it raises ends the trial as aborted.
+        space: The task's, if it is at hand: to make one takes longer than a short trial.
     """
-    why = objection(Space(task.spec.space), theta)
+    why = objection(Space(task.spec.space) if space is None else space, theta)
     if why:
         return Verdict(OutcomeKind.REJECTED, why=why)
     start_s = time.perf_counter()

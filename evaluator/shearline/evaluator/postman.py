@@ -1,15 +1,19 @@
-"""The postman: all that a worker has to do with the network, on a thread of its own.
+"""The postman: all that a worker has to do with the network.
 
-It turns what comes in into events, has the mailbox decide, and carries the instructions out.
-Zenoh's callbacks only put into its queue. It takes no decision itself and does not know what a
+It turns what comes in into events, has the mailbox decide, and carries the instructions out: on
+the trial's thread while that one waits for a trial, else on a thread of its own. Zenoh's
+callbacks only put into its queue. It takes no decision itself and does not know what a
 trial is.
 """
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import logging
 import threading
 import time
+from collections import deque
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -38,6 +42,13 @@ from shearline.protocol.messages import TraceData, Welcome
 
 log = logging.getLogger(__name__)
 
+#: Keys repeat, and taking one apart costs as much as decoding a small message.
+_parse = functools.lru_cache(maxsize=64)(parse)
+
+#: Share of a lease after which the postman's thread looks whether it has to serve; renewals are due
+#: after a quarter of one.
+LOOK_LEASES = 0.05
+
 #: Malformed messages that are told to people; the others are only counted.
 COMPLAINTS_MAX = 10
 
@@ -52,12 +63,20 @@ class End:
 
 @dataclass(slots=True)
 class Exchange:
-    """What the trial's thread and the postman share; every field is safe to use from both.
+    """What the trial's thread and the postman's thread share.
+
+    One of them serves the inbox: the trial's thread while it has nothing to run, so that a trial
+    is not handed from thread to thread, and the postman's thread while a trial runs. ``lock`` is
+    held by whoever serves; queues are safe from anywhere, signal handlers included.
 
     Attributes:
-        inbox: For the postman: events, arrivals, presences and traces.
+        inbox: Events, arrivals, presences and traces, for whoever serves.
+        alarm: Wakes the postman's thread.
+        calls: Wakes the trial's thread while there is no postman.
         jobs: For the trial's thread: what to run, what to prepare, or the end.
-        gate: Set while a trial may begin.
+        postman: Speaks for this evaluator in the run that goes on, if one does.
+        is_busy: Whether the trial's thread has something else to do than to serve.
+        is_open: Whether a trial may begin.
         abort_why: Why the running trial is to end at its next beat, or ``""``.
         leaving: What a signal asked for.
         lease_s: Lease of an attempt, as the learner last said [s].
@@ -65,18 +84,30 @@ class Exchange:
     """
 
     inbox: SimpleQueue[Any] = field(default_factory=SimpleQueue)
-    jobs: SimpleQueue[Run | Prepare | End] = field(default_factory=SimpleQueue)
-    gate: threading.Event = field(default_factory=threading.Event)
+    alarm: SimpleQueue[None] = field(default_factory=SimpleQueue)
+    calls: SimpleQueue[None] = field(default_factory=SimpleQueue)
+    jobs: deque[Run | Prepare | End] = field(default_factory=deque)
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    postman: Postman | None = None
+    is_busy: bool = True
+    is_open: bool = True
     abort_why: str = ""
     leaving: Leave | None = None
     lease_s: float = 2.0
     complaints: int = 0
 
+    def put(self, item: object) -> None:
+        """Enter something for whoever serves; may be called from any thread or signal handler."""
+        self.inbox.put(item)
+        # Read after the item is in; next_job() looks at the inbox after it has changed this.
+        if self.is_busy:
+            self.alarm.put(None)
+
     def leave(self, code: int, why: str) -> None:
         """Have this process leave; may be called from a signal handler."""
         if self.leaving is None:
             self.leaving = Leave(code, why)
-            self.inbox.put(self.leaving)
+            self.put(self.leaving)
 
     def is_leaving(self) -> bool:
         """Tell whether this process was asked to leave."""
@@ -85,14 +116,65 @@ class Exchange:
     def abort(self, why: str) -> None:
         """End the running trial at its next beat, and let no other begin."""
         self.abort_why = why
-        self.gate.set()
 
     def renew(self) -> None:
         """Forget what was meant for the run before."""
-        while not self.jobs.empty():
-            self.jobs.get()
-        self.abort_why = ""
-        self.gate.set()
+        with self.lock:
+            self.jobs.clear()
+            self.abort_why = ""
+            self.is_open = True
+
+    def employ(self, postman: Postman | None) -> None:
+        """Let a postman speak from now on, or nobody."""
+        with self.lock:
+            self.postman = postman
+        self.inbox.put(Tick())
+        self.calls.put(None)
+
+    def finish(self, end: End) -> None:
+        """Have the trial's thread end, without beginning what waits."""
+        self.abort(end.why)
+        with self.lock:
+            self.jobs.append(end)
+        self.calls.put(None)
+
+    def next_job(self) -> Run | Prepare | End:
+        """Return what the trial's thread is to do next; until there is something, serve."""
+        while True:
+            with self.lock:
+                postman = self.postman
+                if postman is not None:
+                    postman.clear()
+                if self.jobs and (self.is_open or self.abort_why or not self._waits_for_trial()):
+                    self.is_busy = True
+                    break
+                self.is_busy = postman is None
+                wait_s = 0.0 if postman is None else postman.wait_s()
+            if postman is None:
+                self.calls.get()
+            else:
+                self._await(postman, wait_s)
+        if not self.inbox.empty():
+            self.alarm.put(None)
+        return self.jobs.popleft()
+
+    def tell(self, event: Event) -> None:
+        """Have an event of the trial's thread acted upon at once, without another thread."""
+        with self.lock:
+            if self.postman is not None:
+                self.postman.take(event)
+
+    def _waits_for_trial(self) -> bool:
+        return isinstance(self.jobs[0], Run)
+
+    def _await(self, postman: Postman, wait_s: float) -> None:
+        try:
+            item = self.inbox.get(timeout=wait_s)
+        except Empty:
+            item = Tick()
+        with self.lock:
+            if self.postman is postman:
+                postman.take(item)
 
 
 class Postman:
@@ -115,6 +197,7 @@ class Postman:
         self._name = name
         self._mailbox = mailbox
         self._others: set[str] = set()
+        self._end: End | None = None
 
     def serve(self, epoch: int) -> End:
         """Take part in the run until it, or this process, ends.
@@ -122,24 +205,56 @@ class Postman:
         Args:
             epoch: Of the learner that was discovered.
         """
-        inbox = self._exchange.inbox
+        exchange = self._exchange
         for pattern in self._keys.to_evaluator(self._name):
-            self._link.subscribe(pattern, inbox)
-        self._link.watch(ANY_LEARNER, inbox)
+            self._link.subscribe(pattern, exchange)
+        self._link.watch(ANY_LEARNER, exchange)
         # Last: whoever sees the token may expect everything else to work.
         boot = self._mailbox.hello.boot
         self._link.announce(self._keys.live_evaluator(self._name, boot))
-        end = self._do(LearnerAlive(epoch))
-        while end is None:
+        with exchange.lock:
+            self.take(LearnerAlive(epoch))
+        exchange.employ(self)
+        try:
+            while (wait_s := self._relieve()) is not None:
+                with contextlib.suppress(Empty):
+                    exchange.alarm.get(timeout=wait_s)
+        finally:
+            exchange.employ(None)
+        assert self._end is not None
+        return self._end
+
+    def _relieve(self) -> float | None:
+        """Serve if the trial's thread is busy; say when to look again [s], nothing at the end."""
+        with self._exchange.lock:
+            if self._exchange.is_busy:
+                self.clear()
+                self.take(Tick())
+            if self._end is not None:
+                return None
+            # While the other thread serves, it may become busy at any time without a sound.
+            return min(self.wait_s(), LOOK_LEASES * self._exchange.lease_s)
+
+    def wait_s(self) -> float:
+        """Return how long nothing need be done unless something comes [s]."""
+        return self._mailbox.wait_s(time.monotonic())
+
+    def clear(self) -> None:
+        """Take all that is in the inbox. The caller holds the lock."""
+        inbox = self._exchange.inbox
+        while not inbox.empty():
             try:
-                item = inbox.get(timeout=self._mailbox.wait_s(time.monotonic()))
+                self.take(inbox.get_nowait())
             except Empty:
-                item = Tick()
-            event = self._read(item)
-            end = None if event is None else self._do(event)
-            if end is None and self._others and self._mailbox.epoch is None:
-                end = self._do(Leave(0, f"run {min(self._others)} has begun instead"))
-        return end
+                return
+
+    def take(self, item: object) -> None:
+        """Act upon one item from the inbox. The caller holds the lock."""
+        event = self._read(item)
+        if event is not None and self._end is None:
+            self._do(event)
+        if self._end is None and self._others and self._mailbox.epoch is None:
+            self._do(Leave(0, f"run {min(self._others)} has begun instead"))
 
     def _read(self, item: object) -> Event | None:
         """Turn one item from the inbox into an event, if it is one."""
@@ -155,7 +270,7 @@ class Postman:
 
     def _hear(self, arrival: Arrival) -> Event | None:
         try:
-            address = parse(arrival.key)
+            address = _parse(arrival.key)
             message = decode(arrival.payload, *BY_TOPIC[address.topic])
         except ProtocolError as fault:
             self._exchange.complaints += 1
@@ -186,25 +301,24 @@ class Postman:
         except ValueError as fault:
             log.warning("the trace of trial %d is not shown: %s", trace.trial, fault)
 
-    def _do(self, event: Event) -> End | None:
-        """Have one event decided and carry out what follows; return the end, if it is one."""
+    def _do(self, event: Event) -> None:
+        """Have one event decided and carry out what follows; note the end, if it is one."""
         for instruction in self._mailbox.handle(event, time.monotonic()):
-            if isinstance(instruction, Quit):
-                return End(instruction.code, instruction.why)
             self._carry_out(instruction)
-        return None
 
     def _carry_out(self, instruction: Instruction) -> None:
+        exchange = self._exchange
         match instruction:
             case Send(message):
                 self._link.publish(self._keys.up(self._name, message), encode(message))
             case Run() | Prepare():
-                self._exchange.jobs.put(instruction)
-            case Gate(is_open=True):
-                self._exchange.gate.set()
-            case Gate():
-                self._exchange.gate.clear()
+                exchange.jobs.append(instruction)
+            case Gate(is_open):
+                exchange.is_open = is_open
             case Abort(why):
-                self._exchange.abort(why)
+                exchange.abort(why)
+            case Quit(code, why):
+                self._end = End(code, why)
+                exchange.alarm.put(None)
             case _:
                 raise AssertionError(instruction)

@@ -40,6 +40,7 @@ from shearline.protocol.messages import (
     clip,
     digest,
 )
+from shearline.protocol.space import Space
 
 log = logging.getLogger(__name__)
 
@@ -126,6 +127,7 @@ class Worker:
         self._hard_exit = hard_exit
         self._boot = secrets.token_hex(8)
         self._engine = ""
+        self._space: Space | None = None
         self._warm = False
         self._over: set[tuple[str, int]] = set()
         self._parted = threading.Event()
@@ -140,7 +142,7 @@ class Worker:
             if self._task is not None:
                 self._prepare(self._task)
             while True:
-                job = self.exchange.jobs.get()
+                job = self.exchange.next_job()
                 match job:
                     case Run(trial):
                         self._try(trial)
@@ -168,13 +170,13 @@ class Worker:
             why = f"task {task.spec.name} cannot start here: {type(fault).__name__}: {fault}"
             self.exchange.leave(4, why)
         else:
-            self._task, self._warm = task, True
-            self.exchange.inbox.put(Ready(self._engine, digest(task.spec)))
+            self._task, self._space, self._warm = task, Space(task.spec.space), True
+            self.exchange.put(Ready(self._engine, digest(task.spec)))
 
     def _take(self, spec: TaskSpec) -> None:
         """Take the learner's task, if it is a built-in that means the same here."""
         if self._task is not None and digest(self._task.spec) == digest(spec):
-            self.exchange.inbox.put(Ready(self._engine, digest(spec)))
+            self.exchange.put(Ready(self._engine, digest(spec)))
             return
         try:
             task = builtin_task(spec.name)
@@ -192,19 +194,18 @@ class Worker:
     def _try(self, trial: Trial) -> None:
         """Run one attempt and report how it ended."""
         exchange = self.exchange
-        exchange.gate.wait()
         assert self._task is not None
         if exchange.abort_why:
             verdict = Verdict(OutcomeKind.ABORTED, why=f"not begun: {exchange.abort_why}")
         else:
-            exchange.inbox.put(Started(trial.token))
+            exchange.tell(Started(trial.token))
             self._deadline_s = time.monotonic() + trial.deadline_s
-            verdict = run_trial(self._task, trial.theta, trial.seed, self._beat)
-        exchange.inbox.put(Ended(self._result(trial, verdict)))
+            verdict = run_trial(self._task, trial.theta, trial.seed, self._beat, self._space)
+        exchange.tell(Ended(self._result(trial, verdict)))
         log.info("trial %d: %s %.6g %s", trial.trial, verdict.kind, verdict.cost, verdict.why)
         if self._config.traces and verdict.trace is not None:
             try:
-                exchange.inbox.put(trace_data(verdict.trace, trial.trial, trial.token))
+                exchange.put(trace_data(verdict.trace, trial.trial, trial.token))
             except ValueError as fault:
                 log.warning("the trace of trial %d is malformed: %s", trial.trial, fault)
 
@@ -217,7 +218,7 @@ class Worker:
             raise TrialStopped("ran longer than its deadline")
         if now_s >= self._beat_s:
             self._beat_s = now_s + RENEW_LEASES * self.exchange.lease_s
-            self.exchange.inbox.put(Beat())
+            self.exchange.put(Beat())
 
     def _result(self, trial: Trial, verdict: Verdict) -> Result:
         return Result(
@@ -251,8 +252,7 @@ class Worker:
         leaving = self.exchange.leaving
         if leaving is not None:
             end = End(leaving.code, leaving.why)
-        self.exchange.abort(end.why)
-        self.exchange.jobs.put(end)
+        self.exchange.finish(end)
         if not self._parted.wait(FAREWELL_S):
             log.warning("%s; the trial does not come back, so the process ends", end.why)
             self._hard_exit(end.code)
