@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any, TypeVar, Union
 
 import msgspec
+import msgspec.inspect
 
 from shearline.protocol.errors import ProtocolError
 from shearline.protocol.messages import (
@@ -92,7 +93,16 @@ class _Nothing(Message, frozen=True, kw_only=True, tag=""):
     """The second kind beside a single one; nobody may send it."""
 
 
-_INERT = frozenset({str, int, bool, bytes, type(None)})
+_WITHOUT_FLOAT = frozenset(
+    {
+        msgspec.inspect.StrType,
+        msgspec.inspect.IntType,
+        msgspec.inspect.BoolType,
+        msgspec.inspect.BytesType,
+        msgspec.inspect.NoneType,
+        msgspec.inspect.EnumType,
+    }
+)
 
 _encoder = msgspec.msgpack.Encoder()
 
@@ -116,7 +126,7 @@ def decode(data: bytes, *kinds: type[M]) -> M:
         raise ProtocolError(f"expected {_names(kinds)}, got {_reason(fault)}") from None
     if isinstance(message, _Nothing):
         raise ProtocolError(f"expected {_names(kinds)}, got a message without a kind")
-    if len(data) > bytes_max(type(message)):
+    if len(data) > CONTROL_BYTES_MAX and type(message) not in BULK:
         raise ProtocolError(
             f"expected at most {bytes_max(type(message))} bytes of {_names((type(message),))},"
             f" got {len(data)}: message refused"
@@ -162,8 +172,11 @@ def is_finite(value: object) -> bool:
     if isinstance(value, float):
         return math.isfinite(value)
     if isinstance(value, msgspec.Struct):
-        fields = (getattr(value, name) for name in value.__struct_fields__)
-        return all(is_finite(field) for field in fields if type(field) not in _INERT)
+        # A loop, not all(): this walk is in every round trip, twice.
+        for name in _floating(type(value)):  # noqa: SIM110
+            if not is_finite(getattr(value, name)):
+                return False
+        return True
     if isinstance(value, list | tuple):
         return _all_finite(value)
     if isinstance(value, dict):
@@ -177,6 +190,25 @@ def _all_finite(values: Collection[Any]) -> bool:
         return all(map(math.isfinite, values))
     except TypeError:
         return all(map(is_finite, values))
+
+
+@cache
+def _floating(kind: type[msgspec.Struct]) -> tuple[str, ...]:
+    """Return the fields of a kind of message in which a float could stand, however deep."""
+    info = msgspec.inspect.type_info(kind)
+    assert isinstance(info, msgspec.inspect.StructType)
+    return tuple(field.name for field in info.fields if _holds_float(field.type))
+
+
+def _holds_float(info: msgspec.inspect.Type) -> bool:
+    match info:
+        case msgspec.inspect.StructType(cls=kind):
+            return bool(_floating(kind))
+        case msgspec.inspect.TupleType(item_types=inners) | msgspec.inspect.UnionType(types=inners):
+            return any(map(_holds_float, inners))
+        case msgspec.inspect.ListType(item_type=inner) | msgspec.inspect.DictType(value_type=inner):
+            return _holds_float(inner)
+    return type(info) not in _WITHOUT_FLOAT
 
 
 @cache
