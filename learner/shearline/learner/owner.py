@@ -183,8 +183,13 @@ class Owner:
         entries = [i.entry for i in out if isinstance(i, Journal)]
         if entries:
             self._journal.append(entries, sync=any(isinstance(e, _DEAR) for e in entries))
+        # Evaluators wait for what is said to them; observers and the log do not.
         for instruction in out:
-            self._effect(instruction)
+            if not isinstance(instruction, Publish | Say):
+                self._effect(instruction)
+        for instruction in out:
+            if isinstance(instruction, Publish | Say):
+                self._effect(instruction)
 
     def _effect(self, instruction: Instruction) -> None:
         match instruction:

@@ -110,6 +110,7 @@ class Link:
         self._low = zenoh.Priority.DATA_LOW
         self._remote = zenoh.Locality.REMOTE
         self._declared: list[Any] = []
+        self._publishers: dict[str, Any] = {}
         self._closed = False
         _open_links.add(self)
         _guard_exit()
@@ -122,8 +123,12 @@ class Link:
             payload: What.
             wait: Block on a peer that does not read, for at most half a second; else drop.
         """
-        control = self._block if wait else self._drop
-        self._session.put(key, payload, congestion_control=control)
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            control = self._block if wait else self._drop
+            publisher = self._session.declare_publisher(key, congestion_control=control)
+            self._publishers[key] = publisher
+        publisher.put(payload)
 
     def observe(self, key: str, payload: bytes) -> None:
         """Send bytes that may be dropped, overtake nothing and never make the sender wait."""
