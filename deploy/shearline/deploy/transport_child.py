@@ -1,4 +1,4 @@
-"""The children of the transport benchmark: started, asked for one JSON object, never left behind."""
+"""The children of the transport benchmark: started, asked for figures, never left behind."""
 
 from __future__ import annotations
 

@@ -11,19 +11,17 @@ import os
 import sys
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import zenoh
 
+from shearline.deploy.processes import die_with_parent
 from shearline.deploy.transport_child import Children, report, statistics
 from shearline.protocol.link import Link, free_endpoint, open_client, open_router
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
 #: As large as a trial and a result of 23 parameters on the wire [bytes].
-THERE_BYTES = 420
-BACK_BYTES = 260
+THERE_BYTES = 365
+BACK_BYTES = 166
 
 #: Round trips of each echo before the clock starts.
 WARM = 100
@@ -124,6 +122,7 @@ def _session(link: Link) -> Any:
 
 
 if __name__ == "__main__":
+    die_with_parent()
     if len(sys.argv) == 3 and not sys.argv[1].isdecimal():
         answer(*sys.argv[1:])
     else:

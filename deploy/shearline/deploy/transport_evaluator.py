@@ -6,6 +6,7 @@ mailbox and a client session of its own; all of one process share the thread tha
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import sys
@@ -90,10 +91,8 @@ def crowd(endpoint: str, run: str, first: int, count: int) -> None:
         lights[light.name] = light
     look_s = 0.0
     while lights:
-        try:
+        with contextlib.suppress(Empty):
             _pass_on(lights, inbox.get(timeout=LOOK_S))
-        except Empty:
-            pass
         if time.monotonic() >= look_s:
             look_s = time.monotonic() + LOOK_S
             lights = {name: light for name, light in lights.items() if light.handle(Tick())}

@@ -24,6 +24,8 @@ from shearline.deploy.transport_task import WaitTask
 from shearline.learner.base import Learner
 from shearline.learner.config import RunConfig
 from shearline.learner.dispatcher import Dispatcher
+from shearline.learner.dispatcher.events import Event, ResultReceived
+from shearline.learner.dispatcher.instructions import Instruction
 from shearline.learner.fitter import Fitter
 from shearline.learner.folder import Folder, logged_to
 from shearline.learner.inbox import Inbox
@@ -34,13 +36,16 @@ from shearline.learner.random_search import RandomSearch
 from shearline.learner.run import SWITCH_INTERVAL_S, TOKEN_BYTES
 from shearline.protocol.keys import Keys
 from shearline.protocol.link import Link, free_endpoint, open_router
-from shearline.protocol.messages import Ack, Message, Trial, Welcome
+from shearline.protocol.messages import Message, Trial, Welcome
 
 #: Trials that each evaluator has done before the clock starts.
 WARM = 100
 
 #: Light evaluators of one process.
 CROWD = 64
+
+#: Trips between two looks at the processor time, which are dear.
+CPU_EVERY = 64
 
 #: How long nothing is to do, and how much of it settles first [s].
 IDLE_S = 6.0
@@ -49,38 +54,76 @@ SETTLE_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Trip:
-    """One trial, from the moment it is handed to the network to the moment its acknowledgement is.
+    """One trial, from before its message is encoded until its result is decoded.
 
     Attributes:
-        cpu_s: Processor time of the learner's process so far [s].
+        cpu_s: Processor time of the learner's process so far, as last looked at [s].
+        wall_s: How long the trial itself ran, as its evaluator says [s].
     """
 
     evaluator: str
     sent_s: float
     taken_s: float
     cpu_s: float
+    wall_s: float
 
 
-class Stopwatch(Outgoing):
-    """Outgoing messages, with the time they leave at."""
+class Stopwatch:
+    """When trials leave and when their results are taken.
 
-    def __init__(self, link: Link, keys: Keys, *, record: bool) -> None:
-        super().__init__(link, keys, record=record)
+    Attributes:
+        trips: Round trips, in the order they ended.
+        joined_s: When each evaluator was welcomed, by name.
+    """
+
+    def __init__(self) -> None:
         self.trips: list[Trip] = []
-        self.welcomed_s: dict[str, float] = {}
+        self.joined_s: dict[str, float] = {}
         self._sent_s: dict[str, float] = {}
+        self._cpu_s = 0.0
+
+    def send(self, evaluator: str, message: Message) -> None:
+        """Note a message that is about to be encoded and sent."""
+        if isinstance(message, Trial):
+            self._sent_s[message.token] = time.perf_counter()
+        elif isinstance(message, Welcome):
+            self.joined_s.setdefault(evaluator, time.perf_counter())
+
+    def take(self, event: ResultReceived) -> None:
+        """Note a result that was decoded and reaches the dispatcher."""
+        sent_s = self._sent_s.pop(event.message.token, None)
+        if sent_s is not None:
+            if len(self.trips) % CPU_EVERY == 0:
+                self._cpu_s = time.process_time()
+            taken_s, wall_s = time.perf_counter(), event.message.wall_s
+            self.trips.append(Trip(event.evaluator, sent_s, taken_s, self._cpu_s, wall_s))
+
+
+class TimedOutgoing(Outgoing):
+    """Outgoing messages that pass a stopwatch."""
+
+    def __init__(self, link: Link, keys: Keys, stopwatch: Stopwatch) -> None:
+        super().__init__(link, keys, record=False)
+        self._stopwatch = stopwatch
 
     def send(self, evaluator: str, message: Message, now_s: float) -> None:
         """Send to one evaluator."""
-        clock_s = time.perf_counter()
-        if isinstance(message, Trial):
-            self._sent_s[message.token] = clock_s
-        elif isinstance(message, Ack) and message.token in self._sent_s:
-            sent_s = self._sent_s.pop(message.token)
-            self.trips.append(Trip(evaluator, sent_s, clock_s, time.process_time()))
-        elif isinstance(message, Welcome):
-            self.welcomed_s.setdefault(evaluator, clock_s)
+        self._stopwatch.send(evaluator, message)
         super().send(evaluator, message, now_s)
+
+
+class TimedDispatcher(Dispatcher):
+    """A dispatcher whose results pass a stopwatch."""
+
+    def __init__(self, config: RunConfig, stopwatch: Stopwatch) -> None:
+        super().__init__(config.rules(), lambda: secrets.token_hex(TOKEN_BYTES))
+        self._stopwatch = stopwatch
+
+    def handle(self, event: Event, now_s: float) -> list[Instruction]:
+        """Advance by one event."""
+        if isinstance(event, ResultReceived):
+            self._stopwatch.take(event)
+        return super().handle(event, now_s)
 
 
 @dataclass(slots=True)
@@ -99,7 +142,7 @@ class Bench:
     idle_s: float = 0.0
     children: Children = field(default_factory=Children)
     idle: dict[str, float] = field(default_factory=dict)
-    stopwatch: Stopwatch = field(init=False)
+    stopwatch: Stopwatch = field(default_factory=Stopwatch)
 
     def lead(self, joining: Callable[[], None]) -> list[Trip]:
         """Lead the run to its end and return its round trips in the order they ended.
@@ -114,14 +157,13 @@ class Bench:
             logged_to(self.run_dir / "learner.log"),
             open_router(self.endpoint) as link,
         ):
-            self.stopwatch = Stopwatch(link, keys, record=False)
             owner = Owner(
                 self.config,
                 keys.run,
-                Dispatcher(self.config.rules(), lambda: secrets.token_hex(TOKEN_BYTES)),
+                TimedDispatcher(self.config, self.stopwatch),
                 folder.journal,
                 Fitter(self._learner, self.config.seed, inbox),
-                self.stopwatch,
+                TimedOutgoing(link, keys, self.stopwatch),
                 inbox,
             )
             epoch = owner.begin()
@@ -169,7 +211,7 @@ def one_by_one(evaluators: int, credits_: int, trials: int, wall_s: float) -> di
 
     Returns:
         ``p50_s``, ``p99_s``, ``rate_hz``, ``cpu_s`` for each trial at the learner, and
-        ``utilisation``: the share of time that trials of ``wall_s`` filled.
+        ``utilisation``: the share of time in which a trial ran, of the mean evaluator.
     """
     config = _config(wall_s, trials, episodes=1)
     with tempfile.TemporaryDirectory() as folder, Children() as children:
@@ -184,11 +226,10 @@ def one_by_one(evaluators: int, credits_: int, trials: int, wall_s: float) -> di
 
         trips = _steady(bench.lead(join), evaluators, evaluators * credits_)
     took_s = trips[-1].taken_s - trips[0].taken_s
-    rate_hz = (len(trips) - 1) / took_s
     return statistics([trip.taken_s - trip.sent_s for trip in trips]) | {
-        "rate_hz": rate_hz,
+        "rate_hz": (len(trips) - 1) / took_s,
         "cpu_s": (trips[-1].cpu_s - trips[0].cpu_s) / (len(trips) - 1),
-        "utilisation": rate_hz * wall_s / evaluators,
+        "utilisation": sum(trip.wall_s for trip in trips) / took_s / evaluators,
     }
 
 
@@ -215,7 +256,7 @@ def crowded(evaluators: int, trials: int) -> dict[str, float]:
             children.say("go")
 
         trips = bench.lead(join)[trials:]
-    joined_s = bench.stopwatch.welcomed_s
+    joined_s = bench.stopwatch.joined_s
     memory_bytes = bench.idle.pop("memory_bytes") - before_bytes
     return {
         "joined": len(joined_s),
@@ -256,5 +297,6 @@ if __name__ == "__main__":
     if sys.argv[1] == "crowd":
         report(crowded(int(sys.argv[2]), int(sys.argv[3])))
     else:
-        report(one_by_one(*map(int, sys.argv[1:4]), wall_s=float(sys.argv[4])))
+        count, at_once, trials_ = map(int, sys.argv[1:4])
+        report(one_by_one(count, at_once, trials_, float(sys.argv[4])))
     os._exit(0)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Mapping, Sequence
 
 from shearline.deploy.exits import Exit
-from shearline.deploy.options import Subparsers, add_json, seconds
+from shearline.deploy.options import Subparsers, add_json, positive, seconds
 
 
 def register(commands: Subparsers) -> None:
@@ -24,6 +25,15 @@ def register(commands: Subparsers) -> None:
     add_json(learner)
     learner.set_defaults(handler=bench_learner)
 
+    transport = kinds.add_parser(
+        "transport", help="round trips and rate of the full path against a bare Zenoh echo"
+    )
+    transport.add_argument(
+        "--starts", type=positive, default=7, help="fresh starts of each measurement (default 7)"
+    )
+    add_json(transport)
+    transport.set_defaults(handler=bench_transport)
+
 
 def bench_sim(arguments: argparse.Namespace) -> int:
     """Print how close a trial comes to the bare engine, and to real time."""
@@ -37,6 +47,21 @@ def bench_learner(arguments: argparse.Namespace) -> int:
     from shearline.learner.bench import measure  # noqa: PLC0415 - loads scikit-learn
 
     return _print(measure(), as_json=arguments.json, single=False)
+
+
+def bench_transport(arguments: argparse.Namespace) -> int:
+    """Print how close a trial's round trip comes to the network's own."""
+    from shearline.deploy.transport import measure  # noqa: PLC0415 - loads zenoh
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    figures = measure(arguments.starts, say=say)
+    if arguments.json:
+        return _print([figures], as_json=True, single=True)
+    for name, value in figures.items():
+        print(f"{name:24} {_short(value)}")
+    return Exit.OK
 
 
 def _print(rows: Sequence[Mapping[str, object]], *, as_json: bool, single: bool) -> int:
