@@ -40,6 +40,9 @@ types: $(INSTALLED)
 quick: $(INSTALLED)  ## the quick suite alone
 	$(BIN)/python -m pytest -m "not slow and not chaos and not bench" -n 2 --dist worksteal -q
 
+chaos: $(INSTALLED)  ## hurt real processes for minutes, and print what it cost (docs/chaos.md)
+	$(BIN)/python -m pytest tests/chaos -m long -p no:randomly -s
+
 bench: $(INSTALLED)  ## side by side with the physical limit
 	$(BIN)/shearline bench sim
 	$(BIN)/shearline bench learner

@@ -20,11 +20,11 @@ from chaos.witness import Witness
 
 from shearline.deploy.observe import Observer
 from shearline.deploy.processes import Child, end, spawn, spawn_command
-from shearline.learner.dispatcher.entries import AnyEntry
+from shearline.learner.dispatcher.entries import AnyEntry, AttemptIssued, ResultTaken
 from shearline.learner.dispatcher.observed import history
 from shearline.learner.journal import read
 from shearline.protocol.link import free_endpoint
-from shearline.protocol.messages import Counted, Message, Status
+from shearline.protocol.messages import Counted, Message, Status, Verdict
 
 #: Only decides when a broken run is given up; a sound one never waits for it [s].
 PATIENCE_S = 90.0
@@ -105,6 +105,30 @@ class Fleet:
         told = [c.at_s for c in self.counted() if c.evaluator in names]
         return sum(from_s <= at_s < to_s for at_s in told) / (to_s - from_s)
 
+    def taken_over_s(self, victim: str, at_s: float) -> float:
+        """Return when the last trial that a victim held at a moment began to run elsewhere [s].
+
+        Counted from that moment; a result's time less how long it ran is when it began.
+        """
+        entries = self.entries()
+        ended = {e.result.token: e for e in entries if isinstance(e, ResultTaken)}
+        held = {
+            e.trial
+            for e in entries
+            if isinstance(e, AttemptIssued)
+            and e.evaluator == victim
+            and e.at_s <= at_s
+            and (e.token not in ended or ended[e.token].at_s > at_s)
+        }
+        assert held, f"{victim} held nothing when it was hurt"
+        began_s = {
+            e.result.trial: e.at_s - e.result.wall_s - at_s
+            for e in ended.values()
+            if e.verdict is Verdict.COUNTED and e.result.trial in held
+        }
+        assert set(began_s) == held
+        return max(began_s.values())
+
     def audit(self) -> Audit:
         """Return the journal of a run that is whole, after it kept every promise."""
         return Audit(self.entries(), whole=True)
@@ -155,6 +179,16 @@ class Fleet:
 def counts(trials: int) -> Callable[[Status], bool]:
     """Return the condition that so many trials are counted."""
     return lambda status: status.counted >= trials
+
+
+def is_busy(name: str) -> Callable[[Status], bool]:
+    """Return the condition that an evaluator holds trials."""
+    return lambda status: any(e.evaluator == name and e.running for e in status.evaluators)
+
+
+def is_over(status: Status) -> bool:
+    """Tell whether the run has ended."""
+    return status.state == "ended"
 
 
 def expect_none_left(folder: Path) -> None:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 from collections import Counter
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 
 from chaos.fleet import PATIENCE_S, Fleet
 from chaos.invariants import Audit, expect_kept
@@ -61,6 +62,7 @@ class Mayhem:
             self._look()
             if kills and len(Audit(self._before).counted) >= kills[0]:
                 del kills[0]
+                self._note("kill learner")
                 learner.process.kill()
                 learner.process.wait()
                 self._look()
@@ -91,6 +93,7 @@ class Mayhem:
         self.done["round"] += 1
         self._calm()
         victim, second = dice.sample(self.names, 2)
+        self._note(f"kill {victim}")
         self._evaluators[victim].process.kill()
         self._evaluators[victim].process.wait()
         self._start(victim)
@@ -99,22 +102,31 @@ class Mayhem:
             return
         relay = self._relays.get(second)
         if relay is None:
+            self._note(f"stop {second}")
             self._evaluators[second].process.send_signal(signal.SIGSTOP)
             self._to_calm.append((second, ""))
             self.done["stopped"] += 1
         else:
             harm, cure = dice.choice(WEATHERS)
+            self._note(f"{harm} {second}")
             relay.order(harm)
             self._to_calm.append((second, cure))
             self.done[harm] += 1
 
     def _calm(self) -> None:
         for name, cure in self._to_calm:
+            self._note(f"{cure or 'continue'} {name}")
             if cure:
                 self._relays[name].order(cure)
             elif self._evaluators[name].returncode is None:
                 self._evaluators[name].process.send_signal(signal.SIGCONT)
         self._to_calm.clear()
+
+    def _note(self, what: str) -> None:
+        """Keep what was done, and when, beside what the children write."""
+        moment = datetime.now(UTC).strftime("%H:%M:%S.%f")
+        with (self.fleet.folder / "mayhem.log").open("a") as log:
+            log.write(f"{moment} {what}\n")
 
     def _start(self, name: str) -> None:
         relay = self._relays.get(name)

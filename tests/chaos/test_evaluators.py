@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from chaos.fleet import Fleet, counts
+from chaos.fleet import Fleet, counts, is_busy
 from chaos.invariants import expect_founded
 
-from shearline.learner.dispatcher.entries import AttemptIssued, ResultTaken
-from shearline.protocol.messages import Status, Verdict
+from shearline.learner.dispatcher.entries import AttemptIssued
 
 pytestmark = pytest.mark.chaos
 
@@ -27,35 +25,6 @@ RUN = [
 SLACK_S = 2.0
 
 
-def is_busy(name: str) -> Callable[[Status], bool]:
-    return lambda status: any(e.evaluator == name and e.running for e in status.evaluators)
-
-
-def taken_over_s(fleet: Fleet, victim: str, at_s: float) -> float:
-    """Return when the last trial that a victim held at a moment began to run elsewhere [s].
-
-    Counted from that moment; a result's time less how long it ran is when it began.
-    """
-    entries = fleet.entries()
-    ended = {e.result.token: e for e in entries if isinstance(e, ResultTaken)}
-    held = {
-        e.trial
-        for e in entries
-        if isinstance(e, AttemptIssued)
-        and e.evaluator == victim
-        and e.at_s <= at_s
-        and (e.token not in ended or ended[e.token].at_s > at_s)
-    }
-    assert held, f"{victim} held nothing when it was hurt"
-    began_s = {
-        e.result.trial: e.at_s - e.result.wall_s - at_s
-        for e in ended.values()
-        if e.verdict is Verdict.COUNTED and e.result.trial in held
-    }
-    assert set(began_s) == held
-    return max(began_s.values())
-
-
 def test_the_trials_of_a_killed_evaluator_run_elsewhere_at_once(tmp_path: Path) -> None:
     with Fleet(tmp_path, RUN) as fleet:
         learner = fleet.learner()
@@ -67,7 +36,7 @@ def test_the_trials_of_a_killed_evaluator_run_elsewhere_at_once(tmp_path: Path) 
         victim.process.kill()
         fleet.outcome(learner)
         fleet.audit()
-        assert taken_over_s(fleet, "victim", at_s) < 0.5 + SLACK_S
+        assert fleet.taken_over_s("victim", at_s) < 0.5 + SLACK_S
 
 
 @pytest.mark.parametrize("how", ["stopped", "hung", "frozen", "half-open"])
@@ -97,7 +66,7 @@ def test_the_trials_of_a_silent_evaluator_run_elsewhere_after_its_lease(
                 relay.order("hush up")
         fleet.outcome(learner)
         fleet.audit()
-        assert taken_over_s(fleet, "victim", at_s) < LEASE_S + 1.0 + SLACK_S
+        assert fleet.taken_over_s("victim", at_s) < LEASE_S + 1.0 + SLACK_S
 
 
 def test_an_evaluator_that_was_stopped_or_frozen_comes_back_and_works_on(tmp_path: Path) -> None:

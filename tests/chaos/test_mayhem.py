@@ -18,9 +18,12 @@ pytestmark = pytest.mark.chaos
 TRIAL_S = 0.04
 
 
-def asked(episodes: int, trials: int) -> list[str]:
+def asked(folder: Path, episodes: int, trials: int) -> list[str]:
+    """Return what to run; a trial may lose many attempts, for here all of them are killed."""
+    file = folder / "mayhem.toml"
+    file.write_text("losses_max = 50\n")
     return [
-        "--task", "sleep-40", "--learner", "lhs", "--episodes", str(episodes),
+        str(file), "--task", "sleep-40", "--learner", "lhs", "--episodes", str(episodes),
         "--trials", str(trials), "--lease", "1", "--no-record",
     ]  # fmt: skip
 
@@ -33,7 +36,7 @@ def wall_s(entries: Sequence[AnyEntry]) -> float:
 
 
 def test_a_hundred_trials_through_everything_at_once(tmp_path: Path) -> None:
-    with Fleet(tmp_path, asked(3, 40)) as fleet:
+    with Fleet(tmp_path, asked(tmp_path, 3, 40)) as fleet:
         mayhem = Mayhem(fleet, ("a", "b", "c"), kill_learner_at=(60,), every_s=1.0)
         mayhem.run()
         assert len(fleet.audit().counted) == 120
@@ -43,7 +46,7 @@ def test_a_hundred_trials_through_everything_at_once(tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("evaluators", [4, 6])
 def test_six_hundred_trials_through_everything_at_once(tmp_path: Path, evaluators: int) -> None:
-    with Fleet(tmp_path, asked(6, 100)) as fleet:
+    with Fleet(tmp_path, asked(tmp_path, 6, 100)) as fleet:
         names = tuple("abcdef"[:evaluators])
         mayhem = Mayhem(fleet, names, kill_learner_at=(150, 300, 450))
         entries = mayhem.run()

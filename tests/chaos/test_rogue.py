@@ -11,11 +11,10 @@ import re
 from pathlib import Path
 
 import pytest
-from chaos.fleet import Fleet, counts
+from chaos.fleet import Fleet, counts, is_over
 from chaos.rogue import FORGED_COST
 
 from shearline.learner.dispatcher.entries import AttemptLapsed, ResultTaken
-from shearline.protocol.messages import Status
 
 pytestmark = pytest.mark.chaos
 
@@ -25,14 +24,9 @@ RUN = [
     "--lease", "2", "--no-record",
 ]  # fmt: skip
 
-#: What the longest step may take [ms], and what a machine with other work may add to it: a step
-#: is measured by the wall, and whoever waits for a core in mid-step shows there.
-STEP_MS_MAX = 50.0
-BUSY_MS = 450.0
-
-
-def is_over(status: Status) -> bool:
-    return status.state == "ended"
+#: A learner that waited for a peer would wait at least so long [ms]; steps are measured by the
+#: wall, so that on a machine with other work they also contain waiting for a core.
+BLOCKED_MS = 500.0
 
 
 @pytest.mark.parametrize("mode", ["flood", "garbage", "forge", "all"])
@@ -58,4 +52,4 @@ def test_a_rogue_has_no_effect(tmp_path: Path, mode: str) -> None:
         assert noise is not None
         if mode in {"garbage", "all"}:
             assert int(noise[1]) > 100
-        assert last.step_ms_max < STEP_MS_MAX + BUSY_MS
+        assert last.step_ms_max < BLOCKED_MS

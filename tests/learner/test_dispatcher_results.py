@@ -248,3 +248,29 @@ def test_every_line_of_the_log_names_its_cause() -> None:
     lapsed = next(e for e in lab.journal if isinstance(e, AttemptLapsed))
     assert story[lapsed.stimulus] == "Tick"
     assert not sent(lab.out, Ack)
+
+
+def test_a_result_said_again_is_no_sign_of_life_of_its_sender() -> None:
+    lab = one_each()
+    token = lab.given("a")[0].token
+    lab.result("a", token)
+    lab.gone("a")
+    handed = len(lab.given("a"))
+    lab.result("a", token)
+    lab.hello("b", credits=2)
+    assert len(lab.given("a")) == handed
+    evaluator = lab.dispatcher.desk.roster.get("a")
+    assert evaluator is not None
+    assert evaluator.gone
+
+
+def test_the_last_words_of_the_dead_do_not_bring_it_back() -> None:
+    lab = one_each()
+    token = lab.given("a")[0].token
+    lab.gone("a")
+    handed = len(lab.given("a"))
+    assert verdicts(lab.result("a", token)) == [Verdict.COUNTED]
+    lab.renew("a", token)
+    assert len(lab.given("a")) == handed
+    lab.hello("a", credits=1)
+    assert len(lab.given("a")) == handed + 1

@@ -13,6 +13,7 @@ from shearline.learner.dispatcher.book import AttemptRow, TrialRow
 from shearline.learner.dispatcher.desk import Desk, Lease
 from shearline.learner.dispatcher.entries import AttemptRevived, ResultTaken
 from shearline.learner.dispatcher.events import RenewReceived, ResultReceived
+from shearline.learner.dispatcher.roster import Evaluator
 from shearline.learner.dispatcher.states import ANSWERED, AttemptState, RunState, TrialState
 from shearline.protocol.messages import Ack, OutcomeKind, Verdict
 
@@ -31,7 +32,7 @@ def renew(desk: Desk, event: RenewReceived) -> None:
     name, message = event.evaluator, event.message
     known = desk.roster.get(name)
     if known is not None and known.boot == message.boot and not known.left:
-        heard(desk, known)
+        _noticed(desk, known)
     for token in message.tokens:
         attempt = desk.book.attempts.get(token)
         if attempt is None or attempt.evaluator != name or attempt.boot != message.boot:
@@ -51,13 +52,14 @@ def result(desk: Desk, event: ResultReceived) -> Verdict:
     if attempt is None or attempt.evaluator != name:
         desk.unknown += 1
         return _acknowledge(desk, event, Verdict.UNKNOWN)
-    known = desk.roster.get(name)
-    if known is not None and known.boot == message.boot and not known.left:
-        heard(desk, known)
-        known.forgive()
     if attempt.state in ANSWERED:
+        # No sign of life: what was said before may be said again long after its sender died.
         desk.resends += 1
         return _acknowledge(desk, event, Verdict.DUPLICATE)
+    known = desk.roster.get(name)
+    if known is not None and known.boot == message.boot and not known.left:
+        _noticed(desk, known)
+        known.forgive()
     trial = desk.book.trials[attempt.trial]
     verdict = _verdict(trial, message.kind)
     _take(desk, event, verdict)
@@ -67,6 +69,15 @@ def result(desk: Desk, event: ResultReceived) -> Verdict:
     elif verdict is Verdict.NOTED:
         desk.say(f"trial {trial.number} {message.kind} by {name}: {message.why or 'no reason'}")
     return verdict
+
+
+def _noticed(desk: Desk, evaluator: Evaluator) -> None:
+    """Note a sign of life; but the last words of the dead may overtake the news of its death.
+
+    Who is taken for gone and is not says hello again, for it hears nothing.
+    """
+    if not evaluator.gone:
+        heard(desk, evaluator)
 
 
 def _take(desk: Desk, event: ResultReceived, verdict: Verdict) -> None:
