@@ -37,7 +37,8 @@ from shearline.learner.registry import create
 from shearline.protocol.messages import VERSION, Hello, OutcomeKind, Result, TaskSpec, Trial
 
 TASK = TaskSpec(name="ball", space={"x": ("m", -1.0, 1.0), "y": ("m", -1.0, 1.0)}, trial_s=5.0)
-LEARNERS = ("lhs", "psp")
+#: psp takes seconds to be imported and told; lhs shows the same of everything but the learner.
+LEARNERS = ("lhs", pytest.param("psp", marks=pytest.mark.slow))
 
 
 def config_of(learner: str) -> RunConfig:

@@ -102,6 +102,7 @@ class SmallWorld:
             task, len(bounds.trials), max(bounds.trials), LEASE_S, losses_max=2, aborts_max=2
         )
         self._tokens = 0
+        self._machine = Dispatcher(self.rules, self._token)
 
     def first(self) -> State:
         """Return the state in which the learner has just started and nobody is there."""
@@ -342,9 +343,8 @@ class SmallWorld:
         return f"token-{self._tokens:08d}"
 
     def _dispatcher(self, desk: Desk) -> Dispatcher:
-        dispatcher = Dispatcher(self.rules, self._token)
-        dispatcher.desk = desk
-        return dispatcher
+        self._machine.desk = desk
+        return self._machine
 
 
 def _result(token: str, boot: str, kind: OutcomeKind) -> Result:

@@ -17,8 +17,8 @@ from simulation.world import World
 QUICK, GROUP = 300, 25
 PUSH, PUSH_GROUP = 2300, 200
 
-#: A planted bug is to be found within so many runs.
-PATIENCE = 500
+#: A planted bug is to be found by one in a hundred of so many runs.
+PATIENCE = 300
 
 
 def breaks(seed: int, plant: Plant = NONE) -> str:

@@ -39,5 +39,5 @@ def main() -> None:
         sys.stdout.write(f"%% {name}\n{mermaid(table)}\n\n")
 
 
-if __name__ == "__main__":
+if __name__ == "__main__":  # pragma: no cover - the command itself
     main()
