@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from shearline.evaluator.base import Outcome, TrialAborted
 from shearline.evaluator.keylock import KeylockTask, draw_setup
 from shearline.evaluator.keylock_spec import LEVELS, keylock_spec, level
 from shearline.evaluator.skill.baselines import TUPLES, tuple_of
 from shearline.evaluator.skill.parameters import BOUNDS, space
-from shearline.evaluator.base import Outcome, TrialAborted
 from shearline.protocol.errors import ConfigError
 from shearline.sims.lock import Lock
 from shearline.sims.plant import PlantError

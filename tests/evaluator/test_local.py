@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shearline.evaluator.base import Array, Outcome, Trace
 from shearline.evaluator.builtin import BowlTask
 from shearline.evaluator.local import EXTRAS_MAX, objection, run_trial, trace_data
-from shearline.evaluator.base import Array, Outcome, Trace
 from shearline.protocol.codec import decode, encode
 from shearline.protocol.messages import OutcomeKind, Result, TraceData
 from shearline.protocol.space import Space

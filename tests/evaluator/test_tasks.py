@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shearline.evaluator import task as exported
+from shearline.evaluator.base import TrialAborted
 from shearline.evaluator.builtin import BowlTask, builtin_names, builtin_spec, builtin_task
 from shearline.evaluator.local import run_trial
-from shearline.evaluator.base import TrialAborted
 from shearline.evaluator.tasks import FunctionTask, load_task, outcome_of, task
 from shearline.protocol.errors import ConfigError, SpaceError
 from shearline.protocol.messages import OutcomeKind, digest

@@ -16,9 +16,9 @@ from typing import Any, Self, TypeVar
 import numpy as np
 import pytest
 
+from shearline.evaluator.base import Array, Outcome, Task, Trace, TrialAborted
 from shearline.evaluator.builtin import BowlTask
 from shearline.evaluator.postman import End
-from shearline.evaluator.base import Array, Outcome, Task, Trace, TrialAborted
 from shearline.evaluator.tasks import FunctionTask
 from shearline.evaluator.tasks import task as declare
 from shearline.evaluator.worker import Worker, WorkerConfig, default_name, run_worker

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shearline.evaluator.base import TrialAborted
 from shearline.evaluator.keylock import KeylockTask
 from shearline.evaluator.skill import manipulation
 from shearline.evaluator.skill.baselines import TUPLES, tuple_of
@@ -12,7 +13,6 @@ from shearline.evaluator.skill.execute import CHUNK_TICKS, Job, execute, execute
 from shearline.evaluator.skill.physics import random_tuples
 from shearline.evaluator.skill.semantic import END, PHASES, SEARCH, SUCCESS, VERDICTS
 from shearline.evaluator.skill.trace import COLUMNS, digest, trace
-from shearline.evaluator.base import TrialAborted
 from shearline.sims.plant import Setup
 from shearline.sims.scene import Q_START, TICK_S, believed_lock_pose
 
