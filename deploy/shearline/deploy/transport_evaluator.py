@@ -87,7 +87,7 @@ def crowd(endpoint: str, run: str, first: int, count: int) -> None:
     inbox: SimpleQueue[Any] = SimpleQueue()
     lights = {}
     for number in range(first, first + count):
-        light = _join(endpoint, run, f"light-{number}", inbox)
+        light = _join(endpoint, run, f"light-{number}", inbox, is_first=number == first)
         lights[light.name] = light
     look_s = 0.0
     while lights:
@@ -98,12 +98,14 @@ def crowd(endpoint: str, run: str, first: int, count: int) -> None:
             lights = {name: light for name, light in lights.items() if light.handle(Tick())}
 
 
-def _join(endpoint: str, run: str, name: str, inbox: SimpleQueue[Any]) -> Light:
+def _join(endpoint: str, run: str, name: str, inbox: SimpleQueue[Any], *, is_first: bool) -> Light:
     """Connect and say hello."""
     link, keys = open_client(endpoint), Keys(run)
     boot = f"boot-of-{name}"
-    for pattern in keys.to_evaluator(name):
-        link.subscribe(pattern, inbox)
+    own, to_all = keys.to_evaluator(name)
+    link.subscribe(own, inbox)
+    if is_first:  # what is said to all is heard once in this process, and passed on
+        link.subscribe(to_all, inbox)
     link.announce(keys.live_evaluator(name, boot))
     hello = Hello(
         boot=boot,

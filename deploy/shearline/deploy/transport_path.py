@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from shearline.deploy.processes import die_with_parent
-from shearline.deploy.transport_child import Children, report, statistics
+from shearline.deploy.transport_child import BenchFailed, Children, report, statistics
 from shearline.deploy.transport_task import WaitTask
 from shearline.learner.base import Learner
 from shearline.learner.config import RunConfig
@@ -224,7 +224,7 @@ def one_by_one(evaluators: int, credits_: int, trials: int, wall_s: float) -> di
                     "transport_evaluator", bench.endpoint, f"e{i}", credits_, wall_s, log=log
                 )
 
-        trips = _steady(bench.lead(join), evaluators, evaluators * credits_)
+        trips = steady(bench.lead(join), evaluators, evaluators * credits_)
     took_s = trips[-1].taken_s - trips[0].taken_s
     return statistics([trip.taken_s - trip.sent_s for trip in trips]) | {
         "rate_hz": (len(trips) - 1) / took_s,
@@ -233,7 +233,7 @@ def one_by_one(evaluators: int, credits_: int, trials: int, wall_s: float) -> di
     }
 
 
-def crowded(evaluators: int, trials: int) -> dict[str, float]:
+def crowded(evaluators: int, trials: int, idle_s: float = IDLE_S) -> dict[str, float]:
     """Measure with many light evaluators in few processes: two episodes, and idleness between.
 
     Returns:
@@ -243,7 +243,7 @@ def crowded(evaluators: int, trials: int) -> dict[str, float]:
     """
     config = _config(0.0, trials, episodes=2)
     with tempfile.TemporaryDirectory() as folder, Children() as children:
-        bench = Bench(config, free_endpoint(), Path(folder, "bench"), IDLE_S, children)
+        bench = Bench(config, free_endpoint(), Path(folder, "bench"), idle_s, children)
         for first in range(0, evaluators, CROWD):
             count = min(CROWD, evaluators - first)
             children.start("transport_evaluator", "crowd", bench.endpoint, "bench", first, count)
@@ -279,8 +279,12 @@ def _config(wall_s: float, trials: int, episodes: int) -> RunConfig:
     )
 
 
-def _steady(trips: list[Trip], evaluators: int, in_flight: int) -> list[Trip]:
-    """Return the round trips after all evaluators are warm and before the run has to end."""
+def steady(trips: list[Trip], evaluators: int, in_flight: int) -> list[Trip]:
+    """Return the round trips after all evaluators are warm and before the run has to end.
+
+    Raises:
+        BenchFailed: If not all evaluators became warm.
+    """
     done: Counter[str] = Counter()
     warm = 0
     for i, trip in enumerate(trips):
@@ -289,7 +293,7 @@ def _steady(trips: list[Trip], evaluators: int, in_flight: int) -> list[Trip]:
             warm += 1
         if warm == evaluators:
             return trips[i : len(trips) - 4 * in_flight]
-    raise RuntimeError(f"expected {evaluators} evaluators to do {WARM} trials each, got {done}")
+    raise BenchFailed(f"expected {evaluators} evaluators to do {WARM} trials each, got {done}")
 
 
 if __name__ == "__main__":

@@ -68,7 +68,7 @@ HANG_S = 1.0
 
 #: Attempts held at once, whatever a peer sends; results remembered after they were acknowledged.
 HELD_MAX = 1024
-ANSWERED_MAX = 256
+ANSWERED_MAX = 64
 
 #: Longest wait for an event; only bounds how late a timer can be [s].
 WAIT_S_MAX = 0.5

@@ -34,6 +34,10 @@ LEASE_MS = 2000
 #: Evaluators, observers and operators that one learner admits.
 SESSIONS_MAX = 4096
 
+#: Keys whose way is remembered: three for each evaluator that a learner admits, and some. Names
+#: that never come back must not fill the memory.
+PUBLISHERS_MAX = 4 * SESSIONS_MAX
+
 #: Longest single attempt to connect, so that Ctrl-C and a deadline are noticed in between [s].
 _SLICE_S = 0.5
 
@@ -110,7 +114,7 @@ class Link:
         self._low = zenoh.Priority.DATA_LOW
         self._remote = zenoh.Locality.REMOTE
         self._declared: list[Any] = []
-        self._publishers: dict[str, Any] = {}
+        self._publishers: dict[tuple[str, bool], Any] = {}
         self._closed = False
         _open_links.add(self)
         _guard_exit()
@@ -123,12 +127,19 @@ class Link:
             payload: What.
             wait: Block on a peer that does not read, for at most half a second; else drop.
         """
-        publisher = self._publishers.get(key)
+        publisher = self._publishers.get((key, wait))
         if publisher is None:
-            control = self._block if wait else self._drop
-            publisher = self._session.declare_publisher(key, congestion_control=control)
-            self._publishers[key] = publisher
+            publisher = self._publisher(key, wait=wait)
         publisher.put(payload)
+
+    def _publisher(self, key: str, *, wait: bool) -> Any:
+        """Declare a key: Zenoh then remembers the way, which it else seeks at each put."""
+        if len(self._publishers) >= PUBLISHERS_MAX:
+            self._publishers = {}  # they undeclare themselves once nobody uses them
+        control = self._block if wait else self._drop
+        publisher = self._session.declare_publisher(key, congestion_control=control)
+        self._publishers[key, wait] = publisher
+        return publisher
 
     def observe(self, key: str, payload: bytes) -> None:
         """Send bytes that may be dropped, overtake nothing and never make the sender wait."""
