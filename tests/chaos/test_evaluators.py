@@ -15,9 +15,9 @@ from shearline.learner.dispatcher.entries import AttemptIssued
 pytestmark = pytest.mark.chaos
 
 LEASE_S = 1.0
-TRIALS = 120
+TRIALS = 80
 RUN = [
-    "--task", "sleep-40", "--learner", "lhs", "--episodes", "3", "--trials", "40",
+    "--task", "sleep-40", "--learner", "lhs", "--episodes", "2", "--trials", "40",
     "--lease", str(LEASE_S), "--no-record",
 ]  # fmt: skip
 
@@ -101,7 +101,7 @@ def test_a_bad_line_costs_time_only(tmp_path: Path, weather: str) -> None:
         fleet.evaluator("near")
         fleet.when(is_busy("far"))
         relay.order(weather)
-        fleet.when(counts(60))
+        fleet.when(counts(50))
         relay.order("delay 0")
         relay.order("mend")
         fleet.outcome(learner)

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.chaos
 
 def run(task: str, learner: str = "lhs") -> list[str]:
     return [
-        "--task", task, "--learner", learner, "--episodes", "4", "--trials", "30",
+        "--task", task, "--learner", learner, "--episodes", "3", "--trials", "30",
         "--lease", "1", "--no-record",
     ]  # fmt: skip
 
@@ -40,7 +40,7 @@ def test_a_learner_killed_again_and_again_proposes_what_an_undisturbed_one_does(
         learner = fleet.learner()
         witness = fleet.witness()
         evaluators = [fleet.evaluator(name) for name in ("one", "two", "three")]
-        for counted in (15, 45, 80):
+        for counted in (15, 45):
             fleet.when(counts(counted))
             learner.process.kill()
             learner.process.wait()
@@ -49,7 +49,7 @@ def test_a_learner_killed_again_and_again_proposes_what_an_undisturbed_one_does(
             expect_kept(before, fleet.entries())
         fleet.outcome(learner)
         audit = fleet.audit()
-        assert audit.epochs == 4
+        assert audit.epochs == 3
         expect_kept(before, fleet.entries())
         expect_founded(fleet.entries(), witness.told())
         assert proposals(fleet.entries()) == expected
@@ -64,7 +64,7 @@ def test_a_router_that_stands_between_may_be_killed_in_mid_run(tmp_path: Path) -
         hub = fleet.script("hub", "hub.py", at=hub_endpoint)
         for name in ("one", "two"):
             fleet.evaluator(name, through=hub_endpoint)
-        for counted in (20, 60):
+        for counted in (20, 50):
             fleet.when(counts(counted))
             hub.process.kill()
             hub.process.wait()

@@ -44,19 +44,17 @@ def test_a_hundred_trials_through_everything_at_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("evaluators", [4, 6])
-def test_six_hundred_trials_through_everything_at_once(tmp_path: Path, evaluators: int) -> None:
+def test_six_hundred_trials_through_everything_at_once(tmp_path: Path) -> None:
     with Fleet(tmp_path, asked(tmp_path, 6, 100)) as fleet:
-        names = tuple("abcdef"[:evaluators])
-        mayhem = Mayhem(fleet, names, kill_learner_at=(150, 300, 450))
+        mayhem = Mayhem(fleet, ("a", "b", "c", "d"), kill_learner_at=(150, 300, 450))
         entries = mayhem.run()
         audit = fleet.audit()
         assert len(audit.counted) == 600
-        ideal_s = 600 * TRIAL_S / evaluators
+        ideal_s = 600 * TRIAL_S / 4
         took_s = wall_s(entries)
         duplicates = fleet.summary()["duplicates"]
         sys.stdout.write(
-            f"\n600 trials on {evaluators}: {took_s:.1f} s, ideal {ideal_s:.1f} s,"
+            f"\n600 trials on 4 evaluators: {took_s:.1f} s, ideal {ideal_s:.1f} s,"
             f" {took_s / ideal_s:.2f}x; {len(audit.attempts)} attempts,"
             f" {duplicates} duplicates in the last life, {dict(mayhem.done)}\n"
         )

@@ -28,6 +28,9 @@ class Ends:
         self.near = socket.create_connection(("127.0.0.1", port_of(relay.endpoint)), PATIENCE_S)
         self.far, _ = server.accept()
         self.far.settimeout(PATIENCE_S)
+        # The far end may be there before the relay knows of it: wait for what passed through.
+        self.near.sendall(b"?")
+        assert self.far.recv(1) == b"?"
 
     def close(self) -> None:
         self.near.close()

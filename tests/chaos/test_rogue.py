@@ -29,14 +29,13 @@ RUN = [
 BLOCKED_MS = 500.0
 
 
-@pytest.mark.parametrize("mode", ["flood", "garbage", "forge", "all"])
-def test_a_rogue_has_no_effect(tmp_path: Path, mode: str) -> None:
+def test_a_rogue_has_no_effect(tmp_path: Path) -> None:
     with Fleet(tmp_path, RUN) as fleet:
         learner = fleet.learner()
         for name in NAMES:
             fleet.evaluator(name)
         fleet.when(counts(5))
-        rogue = fleet.script("rogue", "rogue.py", "run", mode, *NAMES)
+        rogue = fleet.script("rogue", "rogue.py", "run", "all", *NAMES)
         last = fleet.when(is_over)
         assert rogue.returncode is None, "the rogue died before the run ended"
         fleet.outcome(learner)
@@ -50,6 +49,5 @@ def test_a_rogue_has_no_effect(tmp_path: Path, mode: str) -> None:
         assert len(log) < 100_000
         noise = re.search(r"malformed (\d+), dropped (\d+)", log)
         assert noise is not None
-        if mode in {"garbage", "all"}:
-            assert int(noise[1]) > 100
+        assert int(noise[1]) > 100
         assert last.step_ms_max < BLOCKED_MS

@@ -78,11 +78,11 @@ def test_a_run_ends_with_one_json_line_that_says_everything(tmp_path: Path) -> N
     assert [row["trial"] for row in rows] == list(range(30))
 
 
-@pytest.mark.parametrize("delay_s", [0.0, 0.3, 1.0, 2.5])
+@pytest.mark.parametrize("delay_s", [0.0, 0.5, 2.0])
 def test_ctrl_c_at_any_time_ends_in_order_and_the_run_goes_on_later(
     tmp_path: Path, delay_s: float
 ) -> None:
-    asked = ["--task", "sleep-50", "--learner", "lhs", "--episodes", "4", "--trials", "60"]
+    asked = ["--task", "sleep-50", "--learner", "lhs", "--episodes", "3", "--trials", "40"]
     process = up(tmp_path, *asked, "--json")
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(delay_s)
@@ -92,7 +92,7 @@ def test_ctrl_c_at_any_time_ends_in_order_and_the_run_goes_on_later(
     assert code in {130, -signal.SIGINT}, error
     code, out, error = ended(up(tmp_path, *asked, "--json"), tmp_path)
     assert code == 0, error
-    assert json.loads(out.splitlines()[-1])["counted"] == 240
+    assert json.loads(out.splitlines()[-1])["counted"] == 120
 
 
 def test_a_launcher_that_is_killed_leaves_no_orphan(tmp_path: Path) -> None:
