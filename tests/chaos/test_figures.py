@@ -21,9 +21,10 @@ pytestmark = [pytest.mark.chaos, pytest.mark.long]
 LEASE_S = 1.0
 
 
-def asked(trials: int, *further: str) -> list[str]:
+def asked(trials: int, *further: str, episodes: int = 10) -> list[str]:
     return [
-        "--task", "sleep-40", "--learner", "lhs", "--episodes", "10", "--trials", str(trials),
+        "--task", "sleep-40", "--learner", "lhs", "--episodes", str(episodes),
+        "--trials", str(trials),
         "--lease", str(LEASE_S), *further,
     ]  # fmt: skip
 
@@ -51,14 +52,15 @@ def harms(fleet: Fleet, hangs: Path) -> dict[str, Callable[[], None]]:
 
 
 def test_how_soon_the_trials_of_a_lost_evaluator_run_elsewhere(tmp_path: Path) -> None:
-    with Fleet(tmp_path, asked(100, "--no-record")) as fleet:
+    # Long episodes: at the end of one, copies for the idle would hide how long a lease takes.
+    with Fleet(tmp_path, asked(500, "--no-record", episodes=2)) as fleet:
         learner = fleet.learner()
         harm = harms(fleet, tmp_path / "hangs")
         for name in ("one", "two"):
             fleet.evaluator(name)
         at_s = {}
         for name, hurt in harm.items():
-            fleet.when(lambda s, name=name: is_busy(name)(s) and s.pending > 20)  # type: ignore[misc]
+            fleet.when(lambda s, name=name: is_busy(name)(s) and s.pending > 150)  # type: ignore[misc]
             at_s[name] = time.time()
             hurt()
         fleet.outcome(learner)
