@@ -1,9 +1,8 @@
 """Every state of a small world, breadth first, so that what breaks is shown by the shortest path.
 
-``PYTHONPATH=tests python -m simulation.search`` looks at the small world of three trials and says
-how many states there are (``whole``: with an evaluator that dies as well). States are told apart
-by a 64-bit hash of all that can decide what follows. With ten million states the chance that any
-two share a hash is below one in three hundred thousand.
+``PYTHONPATH=tests python -m simulation.search [WORLD ...]`` says how many states there are. States
+are told apart by a 64-bit hash of all that can decide what follows. With a million states the
+chance that any two share a hash is below one in thirty million.
 """
 
 from __future__ import annotations
@@ -12,6 +11,8 @@ import sys
 import time
 from array import array
 from collections import deque
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from simulation.plants import NONE, Plant
@@ -111,17 +112,28 @@ class _Search:
             raise BrokenError("the run cannot end any more after\n" + "\n".join(self._way(trapped)))
 
 
-#: Looked at on every push; by hand, with a minute to spare; and with an hour.
+#: Looked at on every push.
 QUICK = Bounds(trials=(1, 1), credits=(1, 1), kills=0, leases=1)
-SMALL = Bounds(kills=0, leases=1)
-WHOLE = Bounds(kills=1, leases=1)
+
+#: Looked at by hand: three trials first, then fewer of them but more that goes wrong.
+WORLDS: Mapping[str, Bounds] = MappingProxyType(
+    {
+        "trials": Bounds(kills=0, leases=1),
+        "kills": Bounds(trials=(1,), credits=(1, 1), restarts=0, kills=1, leases=1),
+        "aborts": Bounds(trials=(1, 1), credits=(1, 1), kills=0, leases=0, aborts=2),
+        "stops": Bounds(kills=0, leases=0, stops=1),
+        "robot": Bounds((1, 1), (1, 1), ("simulator", "robot"), kills=0, leases=1),
+        "deadlines": Bounds(trials=(1,), credits=(1, 1), trial_s=4.0, kills=0, leases=3),
+    }
+)
 
 
-def main(arguments: list[str]) -> None:
-    """Look at every state and say how many there are."""
-    bounds = WHOLE if arguments == ["whole"] else SMALL
-    found = search(bounds)
-    sys.stdout.write(f"{bounds}\n{found}\n")
+def main(names: list[str]) -> None:
+    """Look at every state of some worlds, or of all, and say how many there are."""
+    for name in names or WORLDS:
+        found = search(WORLDS[name])
+        sys.stdout.write(f"{name}: {found}\n")
+        sys.stdout.flush()
 
 
 if __name__ == "__main__":

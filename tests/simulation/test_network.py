@@ -14,8 +14,8 @@ from simulation.plants import NONE, PLANTS, Plant
 from simulation.world import World
 
 #: Runs of the quick suite, in groups that stay well below a second, and of every push.
-QUICK, GROUP = 300, 25
-PUSH, PUSH_GROUP = 2300, 200
+QUICK, GROUP = 200, 25
+PUSH, PUSH_GROUP = 2200, 200
 
 #: A planted bug is to be found by one in a hundred of so many runs.
 PATIENCE = 300
