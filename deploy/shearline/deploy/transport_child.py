@@ -101,7 +101,7 @@ class Children:
         for process in self.processes:
             process.kill()
         for process in self.processes:
-            process.wait()
+            process.communicate()  # reaps it and closes its pipes
 
 
 def statistics(times_s: Sequence[float]) -> dict[str, float]:
