@@ -119,7 +119,6 @@ QUICK = Bounds(trials=(1, 1), credits=(1, 1), kills=0, leases=1)
 WORLDS: Mapping[str, Bounds] = MappingProxyType(
     {
         "trials": Bounds(kills=0, leases=1),
-        "kills": Bounds(trials=(1,), credits=(1, 1), restarts=0, kills=1, leases=1),
         "aborts": Bounds(trials=(1, 1), credits=(1, 1), kills=0, leases=0, aborts=2),
         "stops": Bounds(kills=0, leases=0, stops=1),
         "robot": Bounds((1, 1), (1, 1), ("simulator", "robot"), kills=0, leases=1),
