@@ -12,10 +12,10 @@ import pytest
 
 pytest.importorskip("zenoh")
 
-from shearline.deploy.transport import first_result, side_by_side
-from shearline.deploy.transport_child import BenchFailed, Children, measured, statistics
-from shearline.deploy.transport_path import WARM, Stopwatch, Trip, crowded, one_by_one, steady
-from shearline.deploy.transport_task import PARAMETERS, WaitTask
+from shearline.deploy.transport.child import BenchFailed, Children, measured, statistics
+from shearline.deploy.transport.measure import first_result, side_by_side
+from shearline.deploy.transport.path import WARM, Stopwatch, Trip, crowded, one_by_one, steady
+from shearline.deploy.transport.task import PARAMETERS, WaitTask
 from shearline.learner.dispatcher.events import ResultReceived
 from shearline.protocol.messages import OutcomeKind, Result, Trial
 

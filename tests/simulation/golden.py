@@ -1,7 +1,7 @@
 """Golden journals: written once by real runs, read again by every version that follows.
 
-``PYTHONPATH=tests python -m simulation.golden tests/learner/golden`` leads runs over the real
-network with light evaluators and writes, where they are missing, each run's journal and the state
+``PYTHONPATH=tests python -m simulation.golden tests/learner/dispatcher/golden`` leads runs over the
+real network with light evaluators and writes, where they are missing, each run's journal and the state
 it leads to. A file that is there is never written again: it stands for runs that users have.
 """
 
@@ -16,11 +16,11 @@ from pathlib import Path
 import msgspec
 from simulation.light import LightEvaluator, succeed
 
-from shearline.learner.config import RunConfig
 from shearline.learner.dispatcher import Book
-from shearline.learner.folder import JOURNAL
-from shearline.learner.journal import read
-from shearline.learner.run import serve
+from shearline.learner.run.config import RunConfig
+from shearline.learner.run.folder import JOURNAL
+from shearline.learner.run.journal import read
+from shearline.learner.run.serving import serve
 from shearline.protocol.codec import encode
 from shearline.protocol.keys import Keys
 from shearline.protocol.link import free_endpoint, open_client

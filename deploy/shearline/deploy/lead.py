@@ -13,12 +13,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from shearline.deploy.options import reach
-from shearline.learner.config import RunConfig
 from shearline.learner.dispatcher.observed import history
-from shearline.learner.folder import JOURNAL
-from shearline.learner.journal import read
-from shearline.learner.run import serve
-from shearline.learner.summary import RunSummary
+from shearline.learner.run.config import RunConfig
+from shearline.learner.run.folder import JOURNAL
+from shearline.learner.run.journal import read
+from shearline.learner.run.serving import serve
+from shearline.learner.run.summary import RunSummary
 from shearline.protocol.errors import RecordError
 from shearline.protocol.link import check_endpoint
 from shearline.protocol.messages import Counted, EpisodeClosed

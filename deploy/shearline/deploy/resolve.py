@@ -16,8 +16,8 @@ from typing import Any
 import msgspec
 
 from shearline.evaluator.tasks import load_task
-from shearline.learner.config import RunConfig, checked
 from shearline.learner.registry import resolve
+from shearline.learner.run.config import RunConfig, checked
 from shearline.protocol.errors import ConfigError
 
 #: Arguments that override what the file says, by the configuration's field.

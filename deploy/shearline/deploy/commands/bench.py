@@ -51,7 +51,7 @@ def bench_learner(arguments: argparse.Namespace) -> int:
 
 def bench_transport(arguments: argparse.Namespace) -> int:
     """Print how close a trial's round trip comes to the network's own."""
-    from shearline.deploy.transport import measure  # noqa: PLC0415 - loads zenoh
+    from shearline.deploy.transport.measure import measure  # noqa: PLC0415 - loads zenoh
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)

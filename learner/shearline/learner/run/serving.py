@@ -15,16 +15,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from shearline.learner.base import Learner
-from shearline.learner.config import RunConfig
 from shearline.learner.dispatcher import Dispatcher
-from shearline.learner.fitter import Fitter
-from shearline.learner.folder import Folder, logged_to
-from shearline.learner.inbox import Inbox
-from shearline.learner.outgoing import Outgoing
-from shearline.learner.owner import Owner
 from shearline.learner.registry import create, resolve
-from shearline.learner.signals import signals_to
-from shearline.learner.summary import RunSummary, summarise
+from shearline.learner.run.config import RunConfig
+from shearline.learner.run.fitter import Fitter
+from shearline.learner.run.folder import Folder, logged_to
+from shearline.learner.run.inbox import Inbox
+from shearline.learner.run.outgoing import Outgoing
+from shearline.learner.run.owner import Owner
+from shearline.learner.run.signals import signals_to
+from shearline.learner.run.summary import RunSummary, summarise
 from shearline.protocol.keys import Keys
 from shearline.protocol.link import Link, open_router
 from shearline.protocol.messages import Status

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from queue import Empty
 
 from shearline.learner.base import Recommendation
-from shearline.learner.config import RunConfig
 from shearline.learner.dispatcher import Dispatcher, status
 from shearline.learner.dispatcher.entries import EpisodeDone, LearnerBooted, TrialsProposed
 from shearline.learner.dispatcher.events import Begin, Event, Tick
@@ -28,13 +27,14 @@ from shearline.learner.dispatcher.instructions import (
     Send,
 )
 from shearline.learner.dispatcher.states import RunState
-from shearline.learner.fitter import Fitter, Modelled, Recommended
-from shearline.learner.inbox import Inbox
-from shearline.learner.incoming import Incoming
-from shearline.learner.journal import Journal as JournalFile
-from shearline.learner.outgoing import Outgoing
-from shearline.learner.pulse import Pulse
-from shearline.learner.signals import Hurry
+from shearline.learner.run.config import RunConfig
+from shearline.learner.run.fitter import Fitter, Modelled, Recommended
+from shearline.learner.run.inbox import Inbox
+from shearline.learner.run.incoming import Incoming
+from shearline.learner.run.journal import Journal as JournalFile
+from shearline.learner.run.outgoing import Outgoing
+from shearline.learner.run.pulse import Pulse
+from shearline.learner.run.signals import Hurry
 from shearline.protocol.link import Arrival, Presence
 from shearline.protocol.messages import Snapshot, Status
 

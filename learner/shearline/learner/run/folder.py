@@ -10,11 +10,11 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import Self
 
-from shearline.learner.config import RunConfig, difference, from_toml, to_toml
 from shearline.learner.dispatcher.book import Book
 from shearline.learner.dispatcher.entries import RunOpened
-from shearline.learner.journal import Journal
-from shearline.learner.summary import RunSummary, to_json, write
+from shearline.learner.run.config import RunConfig, difference, from_toml, to_toml
+from shearline.learner.run.journal import Journal
+from shearline.learner.run.summary import RunSummary, to_json, write
 from shearline.protocol.errors import ConfigError, RecordError
 
 JOURNAL = "journal"

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shearline.learner.config import RunConfig, difference, from_toml, to_toml
-from shearline.learner.seeds import trial_seed
+from shearline.learner.run.config import RunConfig, difference, from_toml, to_toml
+from shearline.learner.run.seeds import trial_seed
 from shearline.protocol.errors import ConfigError, SpaceError
 from shearline.protocol.messages import TaskSpec, digest
 

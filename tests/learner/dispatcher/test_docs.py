@@ -8,7 +8,7 @@ import pytest
 
 from shearline.learner.dispatcher.diagram import TABLES, main, mermaid
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "dispatcher.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "dispatcher.md"
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -16,7 +16,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from shearline.deploy.processes import die_with_parent
-from shearline.deploy.transport_task import WaitTask
+from shearline.deploy.transport.task import WaitTask
 from shearline.evaluator.local import run_trial
 from shearline.evaluator.mail import Ended, Event, Heard, LearnerAlive, Quit, Run, Send, Tick
 from shearline.evaluator.mailbox import Mailbox

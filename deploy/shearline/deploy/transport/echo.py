@@ -16,7 +16,7 @@ from typing import Any
 import zenoh
 
 from shearline.deploy.processes import die_with_parent
-from shearline.deploy.transport_child import Children, report, statistics
+from shearline.deploy.transport.child import Children, report, statistics
 from shearline.protocol.link import Link, free_endpoint, open_client, open_router
 
 #: As large as a trial and a result of 23 parameters on the wire [bytes].

@@ -11,9 +11,9 @@ from typing import Any
 import msgspec
 
 from shearline.learner.base import Recommendation
-from shearline.learner.config import RunConfig
 from shearline.learner.dispatcher.book import Book
 from shearline.learner.dispatcher.instructions import Ending
+from shearline.learner.run.config import RunConfig
 from shearline.protocol.errors import RecordError
 from shearline.protocol.messages import EpisodeClosed
 

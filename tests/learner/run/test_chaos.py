@@ -14,15 +14,15 @@ import pytest
 
 from shearline.learner.dispatcher import Book
 from shearline.learner.dispatcher.entries import AttemptIssued, LearnerBooted, ResultTaken
-from shearline.learner.journal import read
+from shearline.learner.run.journal import read
 from shearline.protocol.errors import RecordError
 from shearline.protocol.link import free_endpoint
 
 LEARNER = """
 import os, sys
 from pathlib import Path
-from shearline.learner.config import RunConfig
-from shearline.learner.run import serve
+from shearline.learner.run.config import RunConfig
+from shearline.learner.run.serving import serve
 from shearline.protocol.messages import TaskSpec
 
 task = TaskSpec(name="t", space={"x": ("", -1.0, 1.0)})

@@ -21,8 +21,8 @@ from shearline.learner.dispatcher.book import Book
 from shearline.learner.dispatcher.events import LearnerFailed, Planned, ProposalsReady
 from shearline.learner.dispatcher.instructions import Ask, Told
 from shearline.learner.errors import LearnerError
-from shearline.learner.inbox import Inbox
-from shearline.learner.seeds import trial_seed
+from shearline.learner.run.inbox import Inbox
+from shearline.learner.run.seeds import trial_seed
 from shearline.protocol.errors import ShearlineError
 from shearline.protocol.messages import clip
 

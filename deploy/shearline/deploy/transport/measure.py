@@ -16,10 +16,10 @@ from statistics import median
 from typing import Any
 
 from shearline.deploy.processes import spawn_command
-from shearline.deploy.transport_child import BenchFailed, measured
+from shearline.deploy.transport.child import BenchFailed, measured
 from shearline.learner.dispatcher.entries import ResultTaken
-from shearline.learner.folder import JOURNAL
-from shearline.learner.journal import read
+from shearline.learner.run.folder import JOURNAL
+from shearline.learner.run.journal import read
 
 #: Fresh processes that a median is taken over.
 STARTS = 7

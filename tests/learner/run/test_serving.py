@@ -16,12 +16,12 @@ import msgspec
 import pytest
 from simulation.light import LightEvaluator, succeed
 
-from shearline.learner.config import RunConfig
 from shearline.learner.dispatcher import Book
 from shearline.learner.dispatcher.entries import LearnerBooted, ResultTaken
-from shearline.learner.journal import read
-from shearline.learner.run import serve
-from shearline.learner.summary import RunSummary
+from shearline.learner.run.config import RunConfig
+from shearline.learner.run.journal import read
+from shearline.learner.run.serving import serve
+from shearline.learner.run.summary import RunSummary
 from shearline.protocol.codec import TO_OBSERVER, decode, encode
 from shearline.protocol.errors import ConfigError, LinkError, RecordError, ShearlineError
 from shearline.protocol.keys import Keys

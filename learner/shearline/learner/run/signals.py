@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import FrameType
 
 from shearline.learner.dispatcher.events import OperatorCommand
-from shearline.learner.inbox import Inbox
+from shearline.learner.run.inbox import Inbox
 from shearline.protocol.messages import CommandKind
 
 _CAUGHT = (signal.SIGINT, signal.SIGTERM)

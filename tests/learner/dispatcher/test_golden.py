@@ -9,7 +9,6 @@ import msgspec
 import pytest
 from simulation.golden import RUNS, state_of
 
-from shearline.learner.config import from_toml
 from shearline.learner.dispatcher import Book, Dispatcher, check, history
 from shearline.learner.dispatcher.entries import (
     AttemptIssued,
@@ -23,7 +22,8 @@ from shearline.learner.dispatcher.entries import (
     TrialsProposed,
 )
 from shearline.learner.dispatcher.events import Begin
-from shearline.learner.journal import Journal, read
+from shearline.learner.run.config import from_toml
+from shearline.learner.run.journal import Journal, read
 from shearline.protocol.messages import Counted
 
 GOLDEN = Path(__file__).parent / "golden"

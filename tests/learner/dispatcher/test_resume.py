@@ -18,7 +18,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shearline.learner.config import RunConfig
 from shearline.learner.dispatcher import Book, Dispatcher
 from shearline.learner.dispatcher.events import (
     Begin,
@@ -29,11 +28,12 @@ from shearline.learner.dispatcher.events import (
     ResultReceived,
 )
 from shearline.learner.dispatcher.instructions import Ask, EndRun, Instruction, Journal, Send, Told
-from shearline.learner.fitter import Fitter, Modelled, Recommended
-from shearline.learner.folder import JOURNAL, Folder
-from shearline.learner.inbox import Inbox
-from shearline.learner.journal import MAGIC
 from shearline.learner.registry import create
+from shearline.learner.run.config import RunConfig
+from shearline.learner.run.fitter import Fitter, Modelled, Recommended
+from shearline.learner.run.folder import JOURNAL, Folder
+from shearline.learner.run.inbox import Inbox
+from shearline.learner.run.journal import MAGIC
 from shearline.protocol.messages import VERSION, Hello, OutcomeKind, Result, TaskSpec, Trial
 
 TASK = TaskSpec(name="ball", space={"x": ("m", -1.0, 1.0), "y": ("m", -1.0, 1.0)}, trial_s=5.0)

@@ -19,21 +19,21 @@ from pathlib import Path
 import numpy as np
 
 from shearline.deploy.processes import die_with_parent
-from shearline.deploy.transport_child import BenchFailed, Children, report, statistics
-from shearline.deploy.transport_task import WaitTask
+from shearline.deploy.transport.child import BenchFailed, Children, report, statistics
+from shearline.deploy.transport.task import WaitTask
 from shearline.learner.base import Learner
-from shearline.learner.config import RunConfig
 from shearline.learner.dispatcher import Dispatcher
 from shearline.learner.dispatcher.events import Event, ResultReceived
 from shearline.learner.dispatcher.instructions import Instruction
-from shearline.learner.fitter import Fitter
-from shearline.learner.folder import Folder, logged_to
-from shearline.learner.inbox import Inbox
 from shearline.learner.ledger import Trials
-from shearline.learner.outgoing import Outgoing
-from shearline.learner.owner import Owner
 from shearline.learner.random_search import RandomSearch
-from shearline.learner.run import SWITCH_INTERVAL_S, TOKEN_BYTES
+from shearline.learner.run.config import RunConfig
+from shearline.learner.run.fitter import Fitter
+from shearline.learner.run.folder import Folder, logged_to
+from shearline.learner.run.inbox import Inbox
+from shearline.learner.run.outgoing import Outgoing
+from shearline.learner.run.owner import Owner
+from shearline.learner.run.serving import SWITCH_INTERVAL_S, TOKEN_BYTES
 from shearline.protocol.keys import Keys
 from shearline.protocol.link import Link, free_endpoint, open_router
 from shearline.protocol.messages import Message, Trial, Welcome

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from simulation.lab import Lab
 
-from shearline.learner import Learner, Proposal, Space, create, inbox
+from shearline.learner import Learner, Proposal, Space, create
 from shearline.learner.dispatcher import Book
 from shearline.learner.dispatcher.events import (
     EvaluatorGone,
@@ -21,13 +21,14 @@ from shearline.learner.dispatcher.events import (
     ProposalsReady,
 )
 from shearline.learner.dispatcher.instructions import Ask
-from shearline.learner.fitter import Fitter, Recommended, model_json
-from shearline.learner.inbox import Inbox
-from shearline.learner.incoming import COMPLAINTS_MAX, Incoming
-from shearline.learner.pulse import Pulse
 from shearline.learner.random_search import RandomSearch
-from shearline.learner.seeds import trial_seed
-from shearline.learner.signals import Hurry, signals_to
+from shearline.learner.run import inbox
+from shearline.learner.run.fitter import Fitter, Recommended, model_json
+from shearline.learner.run.inbox import Inbox
+from shearline.learner.run.incoming import COMPLAINTS_MAX, Incoming
+from shearline.learner.run.pulse import Pulse
+from shearline.learner.run.seeds import trial_seed
+from shearline.learner.run.signals import Hurry, signals_to
 from shearline.protocol.link import Arrival, Presence
 from shearline.protocol.messages import CommandKind
 

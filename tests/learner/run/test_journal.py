@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shearline.learner.dispatcher.entries import AttemptReturned, Entry, LearnerBooted, RunEnded
-from shearline.learner.journal import MAGIC, Journal, read
+from shearline.learner.run.journal import MAGIC, Journal, read
 from shearline.protocol.errors import RecordError
 
 ENTRIES: list[Entry] = [
@@ -54,7 +54,7 @@ def test_an_append_survives_kill_9_of_the_process(path: Path) -> None:
 import os, signal
 from pathlib import Path
 from shearline.learner.dispatcher.entries import LearnerBooted
-from shearline.learner.journal import Journal
+from shearline.learner.run.journal import Journal
 journal = Journal(Path({str(path)!r}))
 for epoch in range(100):
     journal.append([LearnerBooted(at_s=0.0, epoch=epoch)])
