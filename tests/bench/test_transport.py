@@ -74,7 +74,7 @@ def test_memory_and_processor_time_are_those_of_the_children() -> None:
 @pytest.mark.slow
 def test_a_measurement_that_fails_says_what_its_process_said() -> None:
     with pytest.raises(BenchFailed, match=r"1 1 none .* failed: ValueError"):
-        measured("transport_path", 1, 1, "none", 0.0)
+        measured("path", 1, 1, "none", 0.0)
 
 
 @pytest.mark.bench

@@ -1,8 +1,9 @@
 """Golden journals: written once by real runs, read again by every version that follows.
 
-``PYTHONPATH=tests python -m simulation.golden tests/learner/dispatcher/golden`` leads runs over the
-real network with light evaluators and writes, where they are missing, each run's journal and the state
-it leads to. A file that is there is never written again: it stands for runs that users have.
+``PYTHONPATH=tests python -m simulation.golden tests/learner/dispatcher/golden`` leads runs over
+the real network with light evaluators and writes, where they are missing, each run's journal and
+the state it leads to. A file that is there is never written again: it stands for runs that users
+have.
 """
 
 from __future__ import annotations

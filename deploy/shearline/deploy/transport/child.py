@@ -111,7 +111,7 @@ def statistics(times_s: Sequence[float]) -> dict[str, float]:
 
 
 def _command(module: str, arguments: Sequence[object]) -> list[str]:
-    return [sys.executable, "-m", f"shearline.deploy.{module}", *map(str, arguments)]
+    return [sys.executable, "-m", f"shearline.deploy.transport.{module}", *map(str, arguments)]
 
 
 def _environment() -> dict[str, str]:

@@ -108,7 +108,7 @@ def ask(echoes: int, trips: int) -> None:
     with open_router(endpoint) as link, Children() as children:
         asker = Asker(_session(link), names)
         for name in names:
-            children.start("transport_echo", endpoint, name)
+            children.start("echo", endpoint, name)
         asker.wait()
         cpu_s = time.process_time()
         one = asker.ask(trips, 1)

@@ -77,9 +77,9 @@ def side_by_side(
     for start in range(starts):
         say(f"{evaluators} evaluators, start {start + 1} of {starts}")
         trials = trips * evaluators
-        echo.append(measured("transport_echo", evaluators, trials))
-        one.append(measured("transport_path", evaluators, 1, trials, 0.0))
-        two.append(measured("transport_path", evaluators, 2, trials, 0.0))
+        echo.append(measured("echo", evaluators, trials))
+        one.append(measured("path", evaluators, 1, trials, 0.0))
+        two.append(measured("path", evaluators, 2, trials, 0.0))
     raw_one, raw_two = [e["one"] for e in echo], [e["two"] for e in echo]
     tail = "" if evaluators == 1 else f"_{evaluators}"
     return {
@@ -98,13 +98,13 @@ def side_by_side(
 
 def utilisation(starts: int) -> Figures:
     """Measure the share of time in which four evaluators run trials of 5 ms."""
-    runs = _repeated(starts, "transport_path", 4, 2, 4 * WALL_TRIALS, WALL_S)
+    runs = _repeated(starts, "path", 4, 2, 4 * WALL_TRIALS, WALL_S)
     return {"utilisation": _middle(runs, "utilisation")}
 
 
 def many(starts: int) -> Figures:
     """Measure many light evaluators: how they join, how fast they go, what idle ones cost."""
-    runs = _repeated(starts, "transport_path", "crowd", MANY, MANY_TRIALS)
+    runs = _repeated(starts, "path", "crowd", MANY, MANY_TRIALS)
     return {
         "many": MANY,
         "many_join_s": _middle(runs, "join_s"),

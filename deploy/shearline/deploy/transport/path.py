@@ -221,7 +221,7 @@ def one_by_one(evaluators: int, credits_: int, trials: int, wall_s: float) -> di
             for i in range(evaluators):
                 log = Path(folder, f"evaluator-{i}.log")
                 children.start(
-                    "transport_evaluator", bench.endpoint, f"e{i}", credits_, wall_s, log=log
+                    "evaluator", bench.endpoint, f"e{i}", credits_, wall_s, log=log
                 )
 
         trips = steady(bench.lead(join), evaluators, evaluators * credits_)
@@ -246,7 +246,7 @@ def crowded(evaluators: int, trials: int, idle_s: float = IDLE_S) -> dict[str, f
         bench = Bench(config, free_endpoint(), Path(folder, "bench"), idle_s, children)
         for first in range(0, evaluators, CROWD):
             count = min(CROWD, evaluators - first)
-            children.start("transport_evaluator", "crowd", bench.endpoint, "bench", first, count)
+            children.start("evaluator", "crowd", bench.endpoint, "bench", first, count)
         children.hear()
         before_bytes = children.memory_bytes()
         began: list[float] = []
