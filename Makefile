@@ -46,6 +46,7 @@ chaos: $(INSTALLED)  ## hurt real processes for minutes, and print what it cost 
 bench: $(INSTALLED)  ## side by side with the physical limit
 	$(BIN)/shearline bench sim
 	$(BIN)/shearline bench learner
+	$(BIN)/shearline bench transport
 
 clean:  ## remove what was built; runs stay
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage* build dist

@@ -23,7 +23,7 @@ from shearline.deploy.processes import Child, end, spawn, spawn_command
 from shearline.learner.dispatcher.entries import AnyEntry, AttemptIssued, ResultTaken
 from shearline.learner.dispatcher.observed import history
 from shearline.learner.run.journal import read
-from shearline.protocol.link import free_endpoint
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.messages import Counted, Message, Status, Verdict
 
 #: Only decides when a broken run is given up; a sound one never waits for it [s].

@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Self
 
 from shearline.deploy.processes import PARENT_VARIABLE, Child, die_with_parent
-from shearline.protocol.link import free_endpoint
+from shearline.protocol.endpoints import free_endpoint
 
 #: Bytes taken at once, and such chunks held back before the sender is made to wait.
 CHUNK_BYTES = 65_536

@@ -9,7 +9,7 @@ from chaos.fleet import Fleet, counts
 from chaos.invariants import expect_founded, expect_kept
 
 from shearline.learner.dispatcher.entries import AnyEntry, AttemptIssued, TrialsProposed
-from shearline.protocol.link import free_endpoint
+from shearline.protocol.endpoints import free_endpoint
 
 pytestmark = pytest.mark.chaos
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from chaos.relay import Relay, port_of
 
-from shearline.protocol.link import free_endpoint
+from shearline.protocol.endpoints import free_endpoint
 
 pytestmark = pytest.mark.chaos
 

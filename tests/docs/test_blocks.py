@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from shearline.protocol.link import free_endpoint
+from shearline.protocol.endpoints import free_endpoint
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -23,9 +23,10 @@ from shearline.evaluator.tasks import FunctionTask
 from shearline.evaluator.tasks import task as declare
 from shearline.evaluator.worker import Worker, WorkerConfig, default_name, run_worker
 from shearline.protocol.codec import BY_TOPIC, decode, encode
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import ConfigError
 from shearline.protocol.keys import Address, Keys, check_name, parse
-from shearline.protocol.link import Link, Presence, free_endpoint, open_router
+from shearline.protocol.link import Link, Presence, open_router
 from shearline.protocol.messages import (
     Ack,
     Bye,

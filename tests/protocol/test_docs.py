@@ -11,8 +11,9 @@ import pytest
 
 from shearline.protocol import link
 from shearline.protocol.codec import BY_TOPIC, TO_EVALUATOR, TO_LEARNER, TO_OBSERVER, decode, encode
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.keys import Keys, parse
-from shearline.protocol.link import free_endpoint, open_router
+from shearline.protocol.link import open_router
 from shearline.protocol.messages import (
     Ack,
     Bye,

@@ -15,9 +15,10 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from shearline.protocol.codec import encode
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import LinkError
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import Link, free_endpoint, open_router
+from shearline.protocol.link import Link, open_router
 from shearline.protocol.messages import Counted, Message, Proposed, Status, TraceData
 from shearline.record.reader import Run, open_run
 from shearline.record.recorder import main, record_run, spawn

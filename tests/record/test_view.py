@@ -14,9 +14,10 @@ import pytest
 import rerun as rr
 
 from shearline.protocol.codec import encode
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import LinkError, RecordError
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import free_endpoint, open_router
+from shearline.protocol.link import open_router
 from shearline.protocol.messages import Message, TraceData
 from shearline.record import viewer
 from shearline.record.head import config_of

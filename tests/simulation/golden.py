@@ -23,8 +23,9 @@ from shearline.learner.run.folder import JOURNAL
 from shearline.learner.run.journal import read
 from shearline.learner.run.serving import serve
 from shearline.protocol.codec import encode
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import free_endpoint, open_client
+from shearline.protocol.link import open_client
 from shearline.protocol.messages import Command, CommandKind, OutcomeKind, TaskSpec, Trial
 
 TASK = TaskSpec(name="ball", space={"x": ("m", -1.0, 1.0), "y": ("m", -1.0, 1.0)}, trial_s=5.0)

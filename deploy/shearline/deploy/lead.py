@@ -19,8 +19,8 @@ from shearline.learner.run.folder import JOURNAL
 from shearline.learner.run.journal import read
 from shearline.learner.run.serving import serve
 from shearline.learner.run.summary import RunSummary
+from shearline.protocol.endpoints import check_endpoint
 from shearline.protocol.errors import RecordError
-from shearline.protocol.link import check_endpoint
 from shearline.protocol.messages import Counted, EpisodeClosed
 from shearline.record.complete import complete
 from shearline.record.recorder import spawn

@@ -15,7 +15,7 @@ from shearline.deploy.launch import Launch, QuietShow
 from shearline.evaluator.builtin import builtin_task
 from shearline.evaluator.local import run_trial
 from shearline.learner.run.seeds import trial_seed
-from shearline.protocol.link import free_endpoint
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.messages import OutcomeKind
 from shearline.protocol.space import Space
 

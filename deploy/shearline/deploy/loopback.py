@@ -6,8 +6,9 @@ import statistics
 import time
 from queue import Empty, SimpleQueue
 
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import LinkError
-from shearline.protocol.link import Arrival, free_endpoint, open_client, open_router
+from shearline.protocol.link import Arrival, open_client, open_router
 
 PING, PONG = "shearline/doctor/ping", "shearline/doctor/pong"
 ROUNDS = 20

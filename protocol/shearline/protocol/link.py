@@ -9,8 +9,6 @@ that use one are spawned.
 from __future__ import annotations
 
 import json
-import re
-import socket
 import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -22,6 +20,12 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 from weakref import WeakSet
 
 from shearline.protocol.codec import BULK_BYTES_MAX
+from shearline.protocol.endpoints import (
+    check_endpoint,
+    plain,
+    why_nobody,
+    why_not_listening,
+)
 from shearline.protocol.errors import LinkError
 from shearline.protocol.keys import ANY_LEARNER, parse
 
@@ -40,11 +44,6 @@ PUBLISHERS_MAX = 4 * SESSIONS_MAX
 
 #: Longest single attempt to connect, so that Ctrl-C and a deadline are noticed in between [s].
 _SLICE_S = 0.5
-
-_ENDPOINT = re.compile(
-    r"(tcp|tls|quic|udp|ws)/(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[\w.-]+):(?P<port>\d{1,5})([?#]\S*)?",
-    re.ASCII,
-)
 
 #: For both sides. What is not spelled here is Zenoh's default, which listens on every interface
 #: and joins any network it finds: never open a session from a bare configuration.
@@ -229,7 +228,7 @@ def open_router(listen: str, *, settings: Mapping[str, object] | None = None) ->
     try:
         return Link(_open(chosen), listen)
     except zenoh.ZError as fault:
-        raise LinkError(_why_not_listening(listen, str(fault))) from None
+        raise LinkError(why_not_listening(listen, str(fault))) from None
 
 
 def open_client(
@@ -267,11 +266,11 @@ def open_client(
             return Link(_open(chosen), connect)
         except zenoh.ZError as fault:
             if "Unable to connect" not in str(fault):
-                raise LinkError(f"cannot connect to {connect}: {_plain(str(fault))}") from None
+                raise LinkError(f"cannot connect to {connect}: {plain(str(fault))}") from None
         if cancelled is not None and cancelled():
             raise LinkError(f"stopped waiting for a learner at {connect}")
         if timeout_s is not None and time.monotonic() >= end_s:
-            raise LinkError(_why_nobody(connect, timeout_s))
+            raise LinkError(why_nobody(connect, timeout_s))
 
 
 def discover(
@@ -326,27 +325,6 @@ def note_learners(alive: set[tuple[str, int]], inbox: SimpleQueue[Presence], wai
         return
 
 
-def free_endpoint(host: str = "127.0.0.1") -> str:
-    """Return an endpoint that was free a moment ago."""
-    with socket.socket() as probe:
-        probe.bind((host, 0))
-        return f"tcp/{host}:{probe.getsockname()[1]}"
-
-
-def check_endpoint(endpoint: str) -> str:
-    """Return an endpoint that is well-formed.
-
-    Raises:
-        LinkError: If it is not.
-    """
-    match = _ENDPOINT.fullmatch(endpoint)
-    if match is None or not 0 <= int(match["port"]) < 2**16:
-        raise LinkError(
-            f"expected an endpoint such as tcp/192.168.1.5:7447, got {endpoint[:200]!r}: correct it"
-        )
-    return endpoint
-
-
 @cache
 def _guard_exit() -> None:
     """See that a link somebody forgot to close cannot hang the interpreter.
@@ -371,34 +349,6 @@ def _open(settings: Mapping[str, object]) -> zenoh.Session:
     for path, value in {**_COMMON, **settings}.items():
         config.insert_json5(path, json.dumps(value))
     return zenoh.open(config)
-
-
-def _why_not_listening(endpoint: str, fault: str) -> str:
-    for sign, why in (
-        ("Address already in use", "it is taken: choose another port, or stop what listens there"),
-        ("Cannot assign requested", "it is not an address of this machine: correct it"),
-        ("Permission denied", "this user may not: choose a port above 1023"),
-    ):
-        if sign in fault:
-            return f"cannot listen at {endpoint}: {why}"
-    return f"cannot listen at {endpoint}: {_plain(fault)}"
-
-
-def _why_nobody(endpoint: str, timeout_s: float) -> str:
-    match = _ENDPOINT.fullmatch(endpoint)
-    try:
-        socket.getaddrinfo(match and match["host"].strip("[]"), None)
-    except OSError:
-        return f"cannot find the host of {endpoint}: correct its name"
-    return (
-        f"nobody answers at {endpoint} within {timeout_s:g} s:"
-        " start the learner there, or correct the endpoint"
-    )
-
-
-def _plain(fault: str) -> str:
-    """Cut what only Zenoh's authors need: paths of its sources."""
-    return re.sub(r" at /\S+", "", fault)[:200]
 
 
 def _end_s(timeout_s: float | None) -> float:

@@ -18,8 +18,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import RecordError
-from shearline.protocol.link import free_endpoint
 
 #: Nobody listens on the discard port: whatever asks this proxy is refused at once.
 NOWHERE = "http://127.0.0.1:9"

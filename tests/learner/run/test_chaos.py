@@ -15,8 +15,8 @@ import pytest
 from shearline.learner.dispatcher import Book
 from shearline.learner.dispatcher.entries import AttemptIssued, LearnerBooted, ResultTaken
 from shearline.learner.run.journal import read
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import RecordError
-from shearline.protocol.link import free_endpoint
 
 LEARNER = """
 import os, sys

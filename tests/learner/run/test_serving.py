@@ -23,9 +23,10 @@ from shearline.learner.run.journal import read
 from shearline.learner.run.serving import serve
 from shearline.learner.run.summary import RunSummary
 from shearline.protocol.codec import TO_OBSERVER, decode, encode
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import ConfigError, LinkError, RecordError, ShearlineError
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import Arrival, discover, free_endpoint, open_client, open_router
+from shearline.protocol.link import Arrival, discover, open_client, open_router
 from shearline.protocol.messages import (
     Command,
     CommandKind,

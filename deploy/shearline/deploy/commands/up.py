@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     asked = resolve_run(arguments)
     from shearline.deploy.launch import Launch  # noqa: PLC0415 - loads zenoh
-    from shearline.protocol.link import check_endpoint, free_endpoint  # noqa: PLC0415
+    from shearline.protocol.endpoints import check_endpoint, free_endpoint  # noqa: PLC0415
 
     launch = Launch(
         run_dir=asked.run_dir,

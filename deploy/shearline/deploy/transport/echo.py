@@ -17,7 +17,8 @@ import zenoh
 
 from shearline.deploy.processes import die_with_parent
 from shearline.deploy.transport.child import Children, report, statistics
-from shearline.protocol.link import Link, free_endpoint, open_client, open_router
+from shearline.protocol.endpoints import free_endpoint
+from shearline.protocol.link import Link, open_client, open_router
 
 #: As large as a trial and a result of 23 parameters on the wire [bytes].
 THERE_BYTES = 365

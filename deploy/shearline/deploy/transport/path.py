@@ -34,8 +34,9 @@ from shearline.learner.run.inbox import Inbox
 from shearline.learner.run.outgoing import Outgoing
 from shearline.learner.run.owner import Owner
 from shearline.learner.run.serving import SWITCH_INTERVAL_S, TOKEN_BYTES
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import Link, free_endpoint, open_router
+from shearline.protocol.link import Link, open_router
 from shearline.protocol.messages import Message, Trial, Welcome
 
 #: Trials that each evaluator has done before the clock starts.
@@ -220,9 +221,7 @@ def one_by_one(evaluators: int, credits_: int, trials: int, wall_s: float) -> di
         def join() -> None:
             for i in range(evaluators):
                 log = Path(folder, f"evaluator-{i}.log")
-                children.start(
-                    "evaluator", bench.endpoint, f"e{i}", credits_, wall_s, log=log
-                )
+                children.start("evaluator", bench.endpoint, f"e{i}", credits_, wall_s, log=log)
 
         trips = steady(bench.lead(join), evaluators, evaluators * credits_)
     took_s = trips[-1].taken_s - trips[0].taken_s
