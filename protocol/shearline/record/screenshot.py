@@ -20,7 +20,7 @@ from rerun.experimental import ViewerClient
 from shearline.protocol.errors import RecordError
 from shearline.record.reader import open_run
 from shearline.record.view import APPLICATION, draw, layout_of
-from shearline.record.viewer import free_port, quiet_environment
+from shearline.record.viewer import executable, free_port, quiet_environment
 
 #: A picture that has not changed for so many looks is complete ...
 STILL_LOOKS = 3
@@ -85,7 +85,7 @@ def _quiet() -> Iterator[None]:
 @contextmanager
 def _headless() -> Iterator[ViewerClient]:
     try:
-        client = ViewerClient.spawn(headless=True, port=free_port())
+        client = ViewerClient.spawn(headless=True, port=free_port(), executable_path=executable())
     except Exception as error:
         raise RecordError(
             f"a picture needs a graphics driver, a software one will do: {error}"
