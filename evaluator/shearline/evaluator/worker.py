@@ -14,7 +14,6 @@ import platform
 import re
 import secrets
 import signal
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -41,6 +40,7 @@ from shearline.protocol.messages import (
     digest,
 )
 from shearline.protocol.space import Space
+from shearline.protocol.switching import quick_switching
 
 log = logging.getLogger(__name__)
 
@@ -49,10 +49,6 @@ FAREWELL_S = 0.3
 
 #: Longest wait for a session to close [s].
 CLOSE_S = 0.5
-
-#: Lets the postman speak while a trial computes in Python: its answers come within .5 ms instead
-#: of Python's 5 ms [s].
-SWITCH_S = 0.0005
 
 
 class TrialStopped(TrialAborted):
@@ -137,7 +133,7 @@ class Worker:
     def run(self) -> End:
         """Run trials until the end."""
         network = threading.Thread(target=self._network, daemon=True, name="postman")
-        with _signals(self.exchange), _switching():
+        with _signals(self.exchange), quick_switching():
             network.start()
             if self._task is not None:
                 self._prepare(self._task)
@@ -308,13 +304,3 @@ def _signals(exchange: Exchange) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-@contextlib.contextmanager
-def _switching() -> Iterator[None]:
-    before_s = sys.getswitchinterval()
-    sys.setswitchinterval(SWITCH_S)
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(before_s)

@@ -33,11 +33,12 @@ from shearline.learner.run.folder import Folder, logged_to
 from shearline.learner.run.inbox import Inbox
 from shearline.learner.run.outgoing import Outgoing
 from shearline.learner.run.owner import Owner
-from shearline.learner.run.serving import SWITCH_INTERVAL_S, TOKEN_BYTES
+from shearline.learner.run.serving import TOKEN_BYTES
 from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.keys import Keys
 from shearline.protocol.link import Link, open_router
 from shearline.protocol.messages import Message, Trial, Welcome
+from shearline.protocol.switching import quick_switching
 
 #: Trials that each evaluator has done before the clock starts.
 WARM = 100
@@ -152,8 +153,8 @@ class Bench:
             joining: Called once evaluators may join.
         """
         keys, inbox = Keys(self.run_dir.name), Inbox()
-        sys.setswitchinterval(SWITCH_INTERVAL_S)
         with (
+            quick_switching(),
             Folder(self.run_dir, self.config) as folder,
             logged_to(self.run_dir / "learner.log"),
             open_router(self.endpoint) as link,

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import logging
 import secrets
-import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from shearline.learner.base import Learner
@@ -28,9 +26,7 @@ from shearline.learner.run.summary import RunSummary, summarise
 from shearline.protocol.keys import Keys
 from shearline.protocol.link import Link, open_router
 from shearline.protocol.messages import Status
-
-#: Beside a busy Python loop this took the longest answer from 11-31 ms to 4-5 ms.
-SWITCH_INTERVAL_S = 0.0005
+from shearline.protocol.switching import quick_switching
 
 #: 128 random bits: nobody guesses the token of an attempt that was not given to them.
 TOKEN_BYTES = 16
@@ -78,7 +74,7 @@ def serve(
         if folder.damage():
             _log.warning("%s", folder.damage())
         inbox = Inbox()
-        with open_router(listen, settings=settings) as link, signals_to(inbox), _switching():
+        with open_router(listen, settings=settings) as link, signals_to(inbox), quick_switching():
             owner = _owner(config, folder, keys, link, inbox, on_status)
             epoch = owner.begin()
             _listen(link, keys, inbox, epoch)
@@ -128,14 +124,3 @@ def _listen(link: Link, keys: Keys, inbox: Inbox, epoch: int) -> None:
         link.subscribe(pattern, inbox)
     link.watch(keys.live_evaluators(), inbox)
     link.announce(keys.live_learner(epoch))
-
-
-@contextmanager
-def _switching() -> Iterator[None]:
-    """Have threads take turns quickly while the run lasts."""
-    before_s = sys.getswitchinterval()
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(before_s)
