@@ -1,4 +1,4 @@
-"""The small parts of the run: fitter, inbox, pulse, signals, incoming."""
+"""The small parts of the run: fitter, signals, incoming."""
 
 from __future__ import annotations
 
@@ -22,11 +22,9 @@ from shearline.learner.dispatcher.events import (
 )
 from shearline.learner.dispatcher.instructions import Ask
 from shearline.learner.random_search import RandomSearch
-from shearline.learner.run import inbox
 from shearline.learner.run.fitter import Fitter, Recommended, model_json
 from shearline.learner.run.inbox import Inbox
 from shearline.learner.run.incoming import COMPLAINTS_MAX, Incoming
-from shearline.learner.run.pulse import Pulse
 from shearline.learner.run.seeds import trial_seed
 from shearline.learner.run.signals import Hurry, signals_to
 from shearline.protocol.link import Arrival, Presence
@@ -107,59 +105,6 @@ def test_a_run_that_another_learner_proposed_is_not_gone_on_with() -> None:
 def test_a_model_becomes_json_whatever_is_in_it() -> None:
     model = json.loads(model_json(Odd(SPACE, 4, 0)))
     assert model == {"a": [1.0, None], "b": [2.0, {"c": None}]}
-
-
-def test_a_flooded_inbox_drops_heartbeats_then_all_arrivals_but_nothing_of_ours(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(inbox, "BACKLOG", 0)
-    monkeypatch.setattr(inbox, "HEARTBEATS_MAX", 3)
-    monkeypatch.setattr(inbox, "ARRIVALS_MAX", 5)
-    box = Inbox()
-    for _ in range(10):
-        box.put(Arrival("r/ev/a/renew", b""))
-    assert box.qsize() == 3
-    for _ in range(10):
-        box.put(Arrival("r/ev/a/result", b""))
-    assert box.qsize() == 5
-    box.put("ours")
-    assert (box.qsize(), box.dropped) == (6, 15)
-
-
-def test_who_floods_fills_a_share_of_the_inbox_and_the_others_wait_behind_that_alone() -> None:
-    box = Inbox()
-    for _ in range(10_000):
-        box.put(Arrival("r/ev/loud/credit", b""))
-    box.put(Arrival("r/ev/calm/result", b""))
-    assert box.qsize() == inbox.BACKLOG + inbox.SHARE_MAX + 1
-    assert box.dropped == 10_000 - inbox.BACKLOG - inbox.SHARE_MAX
-    while not box.empty():
-        last = box.get()
-    assert last == Arrival("r/ev/calm/result", b"")
-    box.put(Arrival("r/ev/loud/credit", b""))
-    assert box.qsize() == 1
-
-
-def test_senders_are_counted_anew_rather_than_without_bound(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(inbox, "BACKLOG", 0)
-    monkeypatch.setattr(inbox, "SENDERS_MAX", 10)
-    box = Inbox()
-    for name in range(1000):
-        box.put(Arrival(f"r/ev/{name}/credit", b""))
-        assert len(box._shares) <= 10
-
-
-def test_a_pulse_tells_rate_and_percentile() -> None:
-    pulse = Pulse()
-    assert pulse.rate_hz(0, 10.0) == 0.0
-    assert pulse.rate_hz(50, 15.0) == pytest.approx(10.0)
-    assert pulse.step_s_p99() == 0.0
-    for n in range(1, 1001):
-        pulse.step(n / 1000)
-    assert pulse.step_s_max == 1.0
-    assert pulse.step_s_p99() == pytest.approx(0.99, abs=0.01)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

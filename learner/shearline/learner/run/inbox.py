@@ -1,8 +1,9 @@
 """The inbox: the one queue between network callbacks and the owner thread, and it is bounded.
 
-When a peer floods, what peers repeat anyway is dropped: first what it sends beyond its share, so
-that the others do not wait behind it; should many names flood, the heartbeats, then everything
-that came over the network. What the learner's own threads put in always gets through.
+When more waits than honest evaluators cause, only what could mean anything is let in (see the
+doorman), and of that only a share for each key, so that nobody waits behind who floods. Should many
+names flood, the heartbeats are dropped, then everything that came over the network: peers repeat
+it. What the learner's own threads put in always gets through.
 """
 
 from __future__ import annotations
@@ -10,17 +11,21 @@ from __future__ import annotations
 from queue import SimpleQueue
 from typing import Any
 
-from shearline.protocol.link import Arrival
+from shearline.learner.run.doorman import Doorman, is_oversized
+from shearline.protocol.link import Arrival, Presence
 
-#: A backlog that honest evaluators cause together at times; up to it nobody is counted.
+#: A backlog that honest evaluators cause together at times; up to it nobody is asked who it is.
 BACKLOG = 256
 
-#: What one sender may add to a longer backlog until it is gone: an honest one waits for its
-#: answers, so that only a few messages of it are ever on their way.
+#: What may be added on one key to a longer backlog until it is gone: an honest evaluator waits for
+#: its answers, so that only a few messages of it are ever on their way.
 SHARE_MAX = 64
 
-#: Senders counted at once; beyond, counting begins anew rather than growing without bound.
-SENDERS_MAX = 65_536
+#: The same for introductions, which anyone may send; one a second is what an honest one sends.
+HELLOS_MAX = 4
+
+#: Keys counted at once; beyond, counting begins anew rather than growing without bound.
+KEYS_MAX = 65_536
 
 #: Beyond so many waiting items, heartbeats are dropped: a second of the heaviest honest load.
 HEARTBEATS_MAX = 20_000
@@ -34,38 +39,45 @@ _HEARTBEATS = ("/credit", "/renew", "/hello")
 class Inbox(SimpleQueue[Any]):
     """A queue that never grows without bound.
 
+    Args:
+        doorman: Knows who could mean anything; without one everyone is let in.
+
     Attributes:
         dropped: How many items were dropped.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, doorman: Doorman | None = None) -> None:
         super().__init__()
         self.dropped = 0
+        self._doorman = doorman
         self._shares: dict[str, int] = {}
 
     def put(self, item: object, block: bool = True, timeout: float | None = None) -> None:  # noqa: FBT001, FBT002 - the signature of the base
         """Enter an item, unless it is one that its sender repeats and too many wait."""
-        if isinstance(item, Arrival) and not self._admits(item):
+        if isinstance(item, Arrival | Presence) and not self._admits(item):
             self.dropped += 1
             return
         super().put(item, block, timeout)
 
-    def _admits(self, arrival: Arrival) -> bool:
+    def _admits(self, item: Arrival | Presence) -> bool:
         waiting = self.qsize()
         if waiting < BACKLOG:
             if self._shares:
                 self._shares = {}
-            return True
-        if self._share(arrival.key) > SHARE_MAX:
+            return isinstance(item, Presence) or not is_oversized(item)
+        if isinstance(item, Presence):
+            return waiting < ARRIVALS_MAX and (self._doorman is None or self._doorman.minds(item))
+        if is_oversized(item) or not (self._doorman is None or self._doorman.knows(item)):
+            return False
+        if self._share(item.key) > (HELLOS_MAX if item.key.endswith("/hello") else SHARE_MAX):
             return False
         if waiting < HEARTBEATS_MAX:
             return True
-        return waiting < ARRIVALS_MAX and not arrival.key.endswith(_HEARTBEATS)
+        return waiting < ARRIVALS_MAX and not item.key.endswith(_HEARTBEATS)
 
     def _share(self, key: str) -> int:
-        """Return how many items this sender has entered since the backlog was short."""
-        if len(self._shares) >= SENDERS_MAX:
+        """Return how many items came on this key since the backlog was short."""
+        if len(self._shares) >= KEYS_MAX:
             self._shares = {}
-        sender, _, _ = key.rpartition("/")
-        self._shares[sender] = share = self._shares.get(sender, 0) + 1
+        self._shares[key] = share = self._shares.get(key, 0) + 1
         return share

@@ -16,6 +16,7 @@ from shearline.learner.base import Learner
 from shearline.learner.dispatcher import Dispatcher
 from shearline.learner.registry import create, resolve
 from shearline.learner.run.config import RunConfig
+from shearline.learner.run.doorman import Doorman
 from shearline.learner.run.fitter import Fitter
 from shearline.learner.run.folder import Folder, logged_to
 from shearline.learner.run.inbox import Inbox
@@ -73,9 +74,10 @@ def serve(
     with Folder(run_dir, config, resume=resume) as folder, logged_to(run_dir / "learner.log"):
         if folder.damage():
             _log.warning("%s", folder.damage())
-        inbox = Inbox()
+        dispatcher = Dispatcher(config.rules(), lambda: secrets.token_hex(TOKEN_BYTES), folder.book)
+        inbox = Inbox(Doorman(dispatcher.desk))
         with open_router(listen, settings=settings) as link, signals_to(inbox), quick_switching():
-            owner = _owner(config, folder, keys, link, inbox, on_status)
+            owner = _owner(config, folder, keys, dispatcher, link, inbox, on_status)
             epoch = owner.begin()
             _listen(link, keys, inbox, epoch)
             if on_listening is not None:
@@ -99,17 +101,24 @@ def _owner(
     config: RunConfig,
     folder: Folder,
     keys: Keys,
+    dispatcher: Dispatcher,
     link: Link,
     inbox: Inbox,
     on_status: Callable[[Status], None] | None,
 ) -> Owner:
     def make() -> Learner:
-        return create(config.learner, config.space, episode_length=config.trials, seed=config.seed)
+        return create(
+            config.learner,
+            config.space,
+            episode_length=config.trials,
+            seed=config.seed,
+            **config.switches,
+        )
 
     return Owner(
         config,
         keys.run,
-        Dispatcher(config.rules(), lambda: secrets.token_hex(TOKEN_BYTES), folder.book),
+        dispatcher,
         folder.journal,
         Fitter(make, config.seed, inbox),
         Outgoing(link, keys, record=config.record),
