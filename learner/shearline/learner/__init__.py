@@ -14,6 +14,7 @@ Importing this costs numpy and nothing heavier; scikit-learn comes with the firs
 
 from shearline.learner.base import Learner, Proposal, Recommendation
 from shearline.learner.errors import LearnerError, SwitchError, UnknownLearnerError
+from shearline.learner.region import Region
 from shearline.learner.registry import create, names
 from shearline.protocol.space import Space
 
@@ -22,6 +23,7 @@ __all__ = [
     "LearnerError",
     "Proposal",
     "Recommendation",
+    "Region",
     "Space",
     "SwitchError",
     "UnknownLearnerError",

@@ -7,12 +7,13 @@ does not know evaluators, files, clocks or how a trial is run.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
+from shearline.learner.region import Region
 from shearline.protocol.space import Space
 
 Array = npt.NDArray[np.float64]
@@ -38,18 +39,18 @@ class Recommendation:
     Attributes:
         theta: The tuple ``(n,)`` in task units.
         success_probability: Estimated chance that a fresh trial of ``theta`` succeeds, 0 to 1.
-        interval: ``(low, high)`` with about 95 % confidence for that chance.
+        interval: ``(low, high)`` that holds the true chance in nine runs out of ten or more.
         cost: Expected cost of a successful trial of ``theta``, in the task's cost unit;
             ``nan`` while nothing has succeeded.
-        region: The solution subspace around ``theta`` in task units: ``centre`` ``(n,)`` and
-            ``radius`` ``(n,)`` of an axis-parallel ellipsoid; empty until one can be stated.
+        region: The solution subspace around ``theta``, and what a draw from it is worth; ``None``
+            until one can be stated.
     """
 
     theta: Array
     success_probability: float
     interval: tuple[float, float]
     cost: float
-    region: Mapping[str, Array] = field(default_factory=dict)
+    region: Region | None = None
 
 
 @runtime_checkable

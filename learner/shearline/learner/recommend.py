@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from shearline.learner.base import Array, Recommendation
+from shearline.learner.interval import CONFIDENCE, clopper_pearson_low
 from shearline.learner.ledger import Trials
+from shearline.learner.region import Region
 from shearline.protocol.space import Space
 
 #: Trials that count as drawn from the present policy. 60 of 60 support a claim of .951, 30 of 30
 #: one of .905; many more would reach back to episodes that were drawn elsewhere.
 ON_POLICY_TRIALS = 60
-#: Confidence of the stated lower bound.
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,24 +54,6 @@ def elite_focus(trials: Trials, n: int) -> Focus:
     return Focus(cheap.mean(axis=0), np.maximum(cheap.std(axis=0), 0.01))
 
 
-def clopper_pearson_low(successes: int, trials: int, confidence: float = CONFIDENCE) -> float:
-    """Return the exact one-sided lower bound of a success probability.
-
-    The bound of Clopper and Pearson (1934), Biometrika 26:404-413: the probability under which
-    ``successes`` or more would be seen with chance ``1 - confidence``.
-
-    Args:
-        successes: Successes seen, 0 to ``trials``.
-        trials: Trials made, 0 or more.
-        confidence: Between 0 and 1.
-    """
-    if successes == 0:
-        return 0.0
-    from scipy.special import betaincinv  # noqa: PLC0415 - only who recommends pays for scipy
-
-    return float(betaincinv(successes, trials - successes + 1, 1.0 - confidence))
-
-
 def recommendation(space: Space, trials: Trials, focus: Focus) -> Recommendation:
     """State the middle of where the learner stands, and what the trials around it support.
 
@@ -97,7 +79,7 @@ def recommendation(space: Space, trials: Trials, focus: Focus) -> Recommendation
         success_probability=max(low, estimate),
         interval=(low, 1.0),
         cost=_expected_cost(recent, focus),
-        region=_region(space, recent, focus),
+        region=claimed_region(space, recent, focus),
     )
 
 
@@ -110,17 +92,22 @@ def _expected_cost(recent: Trials, focus: Focus) -> float:
     return float(won.cost[order[: (len(won) + 1) // 2]].mean())
 
 
-def _region(space: Space, recent: Trials, focus: Focus) -> dict[str, Array]:
-    """Return the ellipsoid, shaped like the policy, that holds half of the recent successes.
+def claimed_region(space: Space, recent: Trials, focus: Focus) -> Region | None:
+    """Return the ellipsoid with the spread of the policy, held to the policy's own success.
 
-    Empty below two successes. Its success rate has not been measured by fresh draws.
+    Uniform draws from an ellipsoid of half axes ``sqrt(n + 2) scale`` have the standard
+    deviations ``scale``. ``None`` below two successes.
     """
-    won = recent.where(recent.success)
-    if len(won) < 2:
-        return {}
-    reach = float(np.median(focus.distance(won.u)))
-    span = space.high - space.low
-    return {
-        "centre": space.denormalise(np.clip(focus.centre, 0.0, 1.0)),
-        "radius": reach * focus.scale * span,
-    }
+    won = int(recent.success.sum())
+    if won < 2:
+        return None
+    reach = math.sqrt(len(focus.scale) + 2)
+    return Region(
+        space=space,
+        centre=space.denormalise(np.clip(focus.centre, 0.0, 1.0)),
+        radius=reach * focus.scale * (space.high - space.low),
+        success_low=clopper_pearson_low(won, len(recent)),
+        confidence=CONFIDENCE,
+        trials=len(recent),
+        successes=won,
+    )

@@ -257,8 +257,10 @@ class LearnerContract(ABC):
         assert learner.space.contains(answer.theta)
         assert 0.0 <= low <= answer.success_probability <= high <= 1.0
         assert np.isfinite(answer.cost)
-        for key in answer.region:
-            assert answer.region[key].shape == (3,)
+        if answer.region is not None:
+            assert 0.0 <= answer.region.success_low <= 1.0
+            draws = answer.region.sample(np.random.default_rng(0), 20)
+            assert all(answer.region.contains(theta) for theta in draws)
 
     def test_without_a_success_the_cost_is_not_a_number_and_nothing_is_claimed(self) -> None:
         """A lower bound of 0."""

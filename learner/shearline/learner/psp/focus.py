@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from shearline.learner.interval import clopper_pearson_low
 from shearline.learner.ledger import Trials
 from shearline.learner.psp.proposal import Mixture
-from shearline.learner.recommend import ON_POLICY_TRIALS, Focus, clopper_pearson_low
+from shearline.learner.recommend import ON_POLICY_TRIALS, Focus
 
 #: Successes from which their own middle is better known than the component's.
 HELD_MIN = 5
