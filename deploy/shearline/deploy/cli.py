@@ -10,7 +10,17 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from shearline.deploy.commands import bench, doctor, evaluator, learner, operate, show, study, up
+from shearline.deploy.commands import (
+    bench,
+    doctor,
+    evaluator,
+    learner,
+    operate,
+    show,
+    study,
+    trials,
+    up,
+)
 from shearline.deploy.exits import complain
 from shearline.deploy.processes import die_with_parent
 
@@ -40,6 +50,6 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in (up, learner, evaluator, operate, show, bench, study, doctor):
+    for module in (up, learner, evaluator, operate, trials, show, bench, study, doctor):
         module.register(commands)
     return top

@@ -7,5 +7,6 @@
 from shearline.record.complete import complete
 from shearline.record.reader import Run, Trace
 from shearline.record.reader import open_run as open  # noqa: A004 - read as shearline.record.open
+from shearline.record.table import Table
 
-__all__ = ["Run", "Trace", "complete", "open"]
+__all__ = ["Run", "Table", "Trace", "complete", "open"]

@@ -27,11 +27,14 @@ from shearline.protocol.messages import (
     OutcomeKind,
     Proposed,
     Snapshot,
+    Status,
     TraceData,
 )
 from shearline.record.frames import Frame, chunks_in, frame_at, frames, records_of
 from shearline.record.parts import is_live, parts
+from shearline.record.phases import Phase, phases_of
 from shearline.record.schemas import Decoder
+from shearline.record.table import Table, table_of
 from shearline.record.topics import TOPICS, RunConfig
 
 Array = npt.NDArray[np.float32]
@@ -41,7 +44,16 @@ _TRACE = TOPICS[TraceData].name
 #: Read when a run is opened; of traces only the place is kept.
 _HELD = frozenset(
     TOPICS[kind].name
-    for kind in (RunConfig, Proposed, Counted, EpisodeClosed, EvaluatorState, Snapshot, TraceData)
+    for kind in (
+        RunConfig,
+        Proposed,
+        Counted,
+        EpisodeClosed,
+        EvaluatorState,
+        Snapshot,
+        Status,
+        TraceData,
+    )
 )
 
 
@@ -63,6 +75,14 @@ class Trace:
     columns: dict[str, tuple[str, Array]]
     events: tuple[tuple[float, str], ...]
 
+    def __getitem__(self, name: str) -> Array:
+        """Return the values ``(samples,)`` of one column, the clock as ``"t_s"``."""
+        return self.t_s if name == "t_s" else self.columns[name][1]
+
+    def unit(self, name: str) -> str:
+        """Return the unit of one column."""
+        return "s" if name == "t_s" else self.columns[name][0]
+
 
 @dataclass(slots=True)
 class Run:
@@ -77,6 +97,8 @@ class Run:
         episodes: Closed episodes, in order.
         evaluators: Every change of an evaluator's state, in order of time.
         snapshots: The learner's models, in order of episode.
+        status: The run at its last glance; ``None`` where none was recorded.
+        phases: Trial number to the phases of its last traced attempt.
         damage: One sentence for each damage found; empty for a sound record.
     """
 
@@ -87,6 +109,8 @@ class Run:
     episodes: list[EpisodeClosed] = field(default_factory=list)
     evaluators: list[EvaluatorState] = field(default_factory=list)
     snapshots: list[Snapshot] = field(default_factory=list)
+    status: Status | None = None
+    phases: dict[int, tuple[Phase, ...]] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
     _traced: dict[int, list[_Place]] = field(default_factory=dict)
 
@@ -116,6 +140,13 @@ class Run:
         for outcome in self.outcomes:
             yield _row(outcome, self.parameters)
 
+    def table(self) -> Table:
+        """Return the trials as columns ``(trials,)`` with units, for numpy and data frames."""
+        names = self.parameters
+        named = self.config is not None and bool(self.config.names)
+        units = self.config.units if self.config and named else [""] * len(names)
+        return table_of(self.outcomes, names, units)
+
     def traced(self) -> list[int]:
         """Return the numbers of the trials that have a trace."""
         return sorted(self._traced)
@@ -127,6 +158,18 @@ class Run:
             RecordError: If a part can no longer be read where the trace was found.
         """
         return [to_trace(_fetch(place)) for place in self._traced.get(trial, [])]
+
+    def trace(self, trial: int) -> Trace:
+        """Return the trace of one trial; of several traced attempts the last one's.
+
+        Raises:
+            RecordError: If there is none, or it can no longer be read.
+        """
+        places = self._traced.get(trial, [])
+        if not places:
+            have = f"{len(self._traced)} trials have one" if self._traced else "no trial has one"
+            raise RecordError(f"trial {trial} has no trace on this record: {have}")
+        return to_trace(_fetch(places[-1]))
 
     def all_traces(self) -> Iterator[Trace]:
         """Yield every trace in order of arrival; far cheaper than asking trial by trial."""
@@ -203,7 +246,10 @@ def _hold(run: Run, found: _Found) -> None:
             run.evaluators.append(evaluator)
         case Snapshot() as snapshot:
             run.snapshots.append(snapshot)
+        case Status() as status:
+            run.status = status
         case TraceData() as trace:
+            run.phases[trace.trial] = phases_of(trace)
             run._traced.setdefault(trace.trial, []).append(found.place)  # noqa: SLF001 - its builder
 
 
