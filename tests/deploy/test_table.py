@@ -33,12 +33,26 @@ def test_counts_rate_and_time_left_are_shown() -> None:
     text = drawn(status())
     assert "35 of 200 trials counted" in text
     assert "2.00 trials/s" in text
+    assert "at most 7.5 ms of processor time" in drawn(status(step_cpu_ms_max=7.5))
     assert "1:22 left" in text
 
 
 def test_losses_are_shown_only_when_there_are_some() -> None:
     assert "lost" not in drawn(status()).splitlines()[0]
     assert "2 lost, 1 duplicates" in drawn(status(lost=2, duplicates=1)).splitlines()[0]
+    assert "3 malformed, 4 dropped" in drawn(status(malformed=3, dropped=4)).splitlines()[0]
+
+
+def test_who_runs_what_and_for_how_long_it_is_trusted_is_shown() -> None:
+    busy = EvaluatorState(
+        evaluator="e", state="busy", running=6, trials=[7, 8, 9, 10, 11, 12], lease_s=1.26
+    )
+    idle = EvaluatorState(evaluator="i", state="idle")
+    *_, first, second = drawn(status(evaluators=[busy, idle])).splitlines()
+    assert first.split() == [
+        "e", "busy", "7,", "8,", "9,", "10", "and", "2", "more", "1.3", "s", "0", "0",
+    ]  # fmt: skip
+    assert second.split() == ["i", "idle", "-", "-", "0", "0"]
 
 
 @settings(max_examples=20)  # each draws a whole page

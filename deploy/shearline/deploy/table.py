@@ -15,13 +15,22 @@ from shearline.protocol.messages import EpisodeClosed, EvaluatorState, Status
 EPISODES_SHOWN = 12
 #: Evaluators shown at once.
 EVALUATORS_SHOWN = 16
-STATE_STYLE = {"busy": "green", "idle": "cyan", "lost": "red", "held": "yellow"}
+#: Trials named for each of them; the rest is counted.
+TRIALS_SHOWN = 4
+STATE_STYLE = {
+    "busy": "green", "idle": "cyan", "resting": "yellow", "silent": "red", "gone": "red",
+    "left": "dim",
+}  # fmt: skip
 
 
 def render(status: Status) -> RenderableType:
     """Draw the run: headline, progress, episodes and evaluators."""
     return Group(
-        _headline(status), _progress(status), _episodes(status), _evaluators(status.evaluators)
+        _headline(status),
+        _progress(status),
+        _steps(status),
+        _episodes(status),
+        _evaluators(status.evaluators),
     )
 
 
@@ -51,6 +60,8 @@ def _headline(status: Status) -> Text:
         "duplicates": status.duplicates,
         "aborted": status.aborted,
         "rejected": status.rejected,
+        "malformed": status.malformed,
+        "dropped": status.dropped,
     }
     said = [f"{count} {name}" for name, count in losses.items() if count]
     text = Text.assemble((status.run, "bold"), f"  {status.task}, {status.learner}, {status.state}")
@@ -68,6 +79,15 @@ def _progress(status: Status) -> Table:
         f"{duration(time_left_s(status))} left",
     )
     return row
+
+
+def _steps(status: Status) -> Text:
+    """Say what the learner's owner thread takes for one step, the waits of others not counted."""
+    return Text(
+        f"learner: a step takes at most {status.step_cpu_ms_max:.1f} ms of processor time"
+        f" (99 %: {status.step_cpu_ms_p99:.2f} ms), {status.step_ms_max:.1f} ms by the wall",
+        style="dim",
+    )
 
 
 def _episodes(status: Status) -> Table:
@@ -91,11 +111,24 @@ def _episode_row(episode: EpisodeClosed, episodes: int) -> tuple[RenderableType,
 
 def _evaluators(evaluators: list[EvaluatorState]) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 2))
-    for name in ("evaluator", "state", "running", "done", "lost"):
-        table.add_column(name, justify="left" if name in {"evaluator", "state"} else "right")
+    for name in ("evaluator", "state", "trials", "lease", "done", "lost"):
+        table.add_column(name, justify="right" if name in {"lease", "done", "lost"} else "left")
     for one in evaluators[:EVALUATORS_SHOWN]:
-        state = Text(one.state, style=STATE_STYLE.get(one.state, ""))
-        table.add_row(one.evaluator, state, str(one.running), str(one.done), str(one.lost))
+        table.add_row(
+            one.evaluator,
+            Text(one.state, style=STATE_STYLE.get(one.state, "")),
+            _trials(one),
+            "-" if one.lease_s is None else f"{one.lease_s:.1f} s",
+            str(one.done),
+            str(one.lost),
+        )
     if len(evaluators) > EVALUATORS_SHOWN:
-        table.add_row(f"and {len(evaluators) - EVALUATORS_SHOWN} more", "", "", "", "")
+        table.add_row(f"and {len(evaluators) - EVALUATORS_SHOWN} more", "", "", "", "", "")
     return table
+
+
+def _trials(one: EvaluatorState) -> str:
+    """Name the trials an evaluator holds."""
+    named = [str(number) for number in one.trials[:TRIALS_SHOWN]]
+    more = one.running - len(named)
+    return ", ".join(named) + (f" and {more} more" if more > 0 else "") if named else "-"

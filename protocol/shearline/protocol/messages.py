@@ -264,7 +264,14 @@ class EpisodeClosed(Message, frozen=True, kw_only=True, tag="episode"):
 
 
 class EvaluatorState(Message, frozen=True, kw_only=True, tag="evaluator"):
-    """Where one evaluator stands, said at every change."""
+    """Where one evaluator stands, said at every change.
+
+    Attributes:
+        state: ``"busy"``, ``"idle"``, ``"resting"``, ``"silent"``, ``"gone"`` or ``"left"``.
+        running: How many attempts it holds, those that wait there among them.
+        trials: The first of these trials, oldest first.
+        lease_s: When the first of their leases runs out unless renewed, from now [s].
+    """
 
     evaluator: Name
     state: Annotated[str, Meta(max_length=32)]
@@ -274,6 +281,8 @@ class EvaluatorState(Message, frozen=True, kw_only=True, tag="evaluator"):
     done: Count = 0
     lost: Count = 0
     at_s: Seconds = 0.0
+    trials: Annotated[list[Count], Meta(max_length=16)] = []
+    lease_s: Seconds | None = None
 
 
 class Snapshot(Message, frozen=True, kw_only=True, tag="snapshot"):
@@ -290,7 +299,12 @@ class Status(Message, frozen=True, kw_only=True, tag="status"):
 
     Attributes:
         state: ``"running"``, ``"held"``, ``"stopping"`` or ``"ended"``.
-        step_ms_max: Longest step of the learner's owner thread so far [ms].
+        step_ms_max: Longest step of the learner's owner thread so far, by the wall [ms].
+        step_ms_p99: What 99 % of its steps stayed within [ms].
+        step_cpu_ms_max: Longest step so far, by its thread's processor time [ms].
+        step_cpu_ms_p99: What 99 % of its steps stayed within [ms].
+        malformed: Messages that the protocol does not allow, heard in this epoch.
+        dropped: Messages that found the inbox crowded, in this epoch.
     """
 
     run: Text
@@ -315,6 +329,11 @@ class Status(Message, frozen=True, kw_only=True, tag="status"):
     evaluators: list[EvaluatorState]
     history: list[EpisodeClosed]
     at_s: Seconds
+    step_ms_p99: float = 0.0
+    step_cpu_ms_max: float = 0.0
+    step_cpu_ms_p99: float = 0.0
+    malformed: Count = 0
+    dropped: Count = 0
 
 
 class TraceData(Message, frozen=True, kw_only=True, tag="trace"):

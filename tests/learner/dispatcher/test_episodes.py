@@ -26,7 +26,7 @@ from shearline.learner.dispatcher.instructions import (
     Publish,
 )
 from shearline.learner.dispatcher.states import RunState
-from shearline.learner.dispatcher.status import status
+from shearline.learner.dispatcher.status import Vitals, status
 from shearline.protocol.messages import (
     Command,
     CommandKind,
@@ -308,16 +308,20 @@ def test_the_head_of_the_journal_is_kept() -> None:
 def test_a_status_adds_up() -> None:
     lab = Lab(trials=6)
     lab.hello("a")
-    empty = status(lab.dispatcher, run="r", learner="psp", rate_hz=0.0, step_ms_max=0.0)
+    empty = status(lab.dispatcher, run="r", learner="psp", vitals=Vitals())
     assert (empty.pending, empty.leased, empty.done, empty.state) == (0, 0, 0, "running")
     lab.propose()
     lab.result("a", lab.given("a")[0].token)
     lab.result("a", lab.given("a")[0].token)
-    now = status(lab.dispatcher, run="r", learner="psp", rate_hz=2.0, step_ms_max=3.0)
+    now = status(
+        lab.dispatcher, run="r", learner="psp", vitals=Vitals(rate_hz=2.0, step_ms_max=3.0)
+    )
     assert (now.pending, now.leased, now.done, now.counted, now.duplicates) == (3, 2, 1, 1, 1)
     assert [(e.evaluator, e.state, e.running, e.done) for e in now.evaluators] == [
         ("a", "busy", 2, 1)
     ]
+    assert [e.trials for e in now.evaluators] == [[1, 2]]
+    assert [e.lease_s for e in now.evaluators] == [LEASE_S]
     assert now.history == []
 
 

@@ -33,6 +33,9 @@ from shearline.learner.dispatcher.rules import REJOIN_LEASES, TURNAROUNDS_MAX, R
 from shearline.learner.dispatcher.states import RUN, RunCause, RunState, advance
 from shearline.protocol.messages import EvaluatorState, Message, Trial
 
+#: Trials of one evaluator that observers are told; most hold two.
+TRIALS_SHOWN = 16
+
 
 @dataclass(slots=True)
 class Lease:
@@ -119,12 +122,16 @@ class Desk:
 
     def describe(self, evaluator: Evaluator) -> EvaluatorState:
         """Return where an evaluator stands."""
+        held = list(self.book.held_by.get(evaluator.name, ()))
+        left_s = [self.leases[token].until_s - self.clock_s for token in held]
         return EvaluatorState(
             evaluator=evaluator.name,
             state=self.standing(evaluator),
             kind=evaluator.kind,
             engine=evaluator.engine,
-            running=self.book.held_of(evaluator.name),
+            running=len(held),
+            trials=[self.book.attempts[token].trial for token in held[:TRIALS_SHOWN]],
+            lease_s=max(min(left_s), 0.0) if held else None,
             done=evaluator.done,
             lost=evaluator.lost,
             at_s=self.now_s,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from shearline.learner.dispatcher.core import Dispatcher
 from shearline.learner.dispatcher.states import TrialState
 from shearline.protocol.messages import Status
@@ -10,17 +12,27 @@ from shearline.protocol.messages import Status
 HISTORY_MAX = 1000
 
 
-def status(
-    dispatcher: Dispatcher, *, run: str, learner: str, rate_hz: float, step_ms_max: float
-) -> Status:
+@dataclass(frozen=True, slots=True)
+class Vitals:
+    """What only the shell around a dispatcher can measure; see :class:`Status` for the fields."""
+
+    rate_hz: float = 0.0
+    step_ms_max: float = 0.0
+    step_ms_p99: float = 0.0
+    step_cpu_ms_max: float = 0.0
+    step_cpu_ms_p99: float = 0.0
+    malformed: int = 0
+    dropped: int = 0
+
+
+def status(dispatcher: Dispatcher, *, run: str, learner: str, vitals: Vitals) -> Status:
     """Return where the run stands.
 
     Args:
         dispatcher: Whose run it is.
         run: The run's name.
         learner: The learner's name.
-        rate_hz: Trials counted per second of late [1/s].
-        step_ms_max: Longest step of the owner thread so far [ms].
+        vitals: What its shell measured.
     """
     desk, book = dispatcher.desk, dispatcher.book
     rows = book.rows(len(book.episodes) - 1) if book.episodes else []
@@ -44,8 +56,13 @@ def status(
         duplicates=book.tally.surplus + desk.resends,
         aborted=book.tally.aborted,
         rejected=book.tally.rejected,
-        rate_hz=rate_hz,
-        step_ms_max=step_ms_max,
+        rate_hz=vitals.rate_hz,
+        step_ms_max=vitals.step_ms_max,
+        step_ms_p99=vitals.step_ms_p99,
+        step_cpu_ms_max=vitals.step_cpu_ms_max,
+        step_cpu_ms_p99=vitals.step_cpu_ms_p99,
+        malformed=vitals.malformed,
+        dropped=vitals.dropped,
         evaluators=[desk.describe(evaluator) for evaluator in desk.roster],
         history=book.closed[-HISTORY_MAX:],
         at_s=desk.now_s,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import Counter
 from collections.abc import Callable
 from queue import Empty
 
@@ -27,6 +28,7 @@ from shearline.learner.dispatcher.instructions import (
     Send,
 )
 from shearline.learner.dispatcher.states import RunState
+from shearline.learner.dispatcher.status import Vitals
 from shearline.learner.run.config import RunConfig
 from shearline.learner.run.fitter import Fitter, Modelled, Recommended
 from shearline.learner.run.inbox import Inbox
@@ -35,13 +37,16 @@ from shearline.learner.run.journal import Journal as JournalFile
 from shearline.learner.run.outgoing import Outgoing
 from shearline.learner.run.pulse import Pulse
 from shearline.learner.run.signals import Hurry
-from shearline.protocol.link import Arrival, Presence
+from shearline.protocol.intake import Arrival, Presence
 from shearline.protocol.messages import Snapshot, Status
 
 #: Items taken in one step: one write for all of them, and a bound on how long a step takes.
 STEP_ITEMS_MAX = 32
 
 STATUS_EVERY_S = 0.5
+
+#: No step may cost more, whatever evaluators do; one that does is logged [s].
+STEP_CPU_S_MAX = 0.05
 
 #: How long the end waits for evaluators to leave, and for the learner's last word [s].
 LINGER_S = 2.0
@@ -117,7 +122,7 @@ class Owner:
         """
         while not self._is_over():
             items = self._take()
-            began_s = time.perf_counter()
+            began_s, began_cpu_s = time.perf_counter(), time.thread_time()
             out: list[Instruction] = []
             for item in items:
                 if isinstance(item, Hurry):
@@ -131,14 +136,35 @@ class Owner:
             self._carry_out(out)
             if self._now_s() >= self._next_status_s:
                 self._show()
-            self._pulse.step(time.perf_counter() - began_s)
+            cpu_s = time.thread_time() - began_cpu_s
+            self._pulse.step(time.perf_counter() - began_s, cpu_s)
+            if cpu_s > STEP_CPU_S_MAX:
+                kinds = Counter(type(item).__name__ for item in items)
+                _log.warning("a step took %.0f ms of processor time: %s", 1e3 * cpu_s, dict(kinds))
         self._show()
+        vitals = self.vitals()
         _log.info(
-            "steps: p99 %.2f ms, longest %.2f ms; malformed %d, dropped %d",
-            1e3 * self._pulse.step_s_p99(),
-            1e3 * self._pulse.step_s_max,
-            self._incoming.malformed,
-            self._inbox.dropped,
+            "steps: p99 %.2f ms, longest %.2f ms; of processor time: p99 %.2f ms, longest %.2f ms;"
+            " malformed %d, dropped %d",
+            vitals.step_ms_p99,
+            vitals.step_ms_max,
+            vitals.step_cpu_ms_p99,
+            vitals.step_cpu_ms_max,
+            vitals.malformed,
+            vitals.dropped,
+        )
+
+    def vitals(self) -> Vitals:
+        """Return how the owner itself does."""
+        pulse = self._pulse
+        return Vitals(
+            rate_hz=pulse.rate_hz(self.dispatcher.book.tally.counted, self._now_s()),
+            step_ms_max=1e3 * pulse.wall.longest_s,
+            step_ms_p99=1e3 * pulse.wall.percentile_s(0.99),
+            step_cpu_ms_max=1e3 * pulse.cpu.longest_s,
+            step_cpu_ms_p99=1e3 * pulse.cpu.percentile_s(0.99),
+            malformed=self._incoming.malformed,
+            dropped=self._inbox.dropped,
         )
 
     # -- in ---------------------------------------------------------------------------------
@@ -216,8 +242,7 @@ class Owner:
             self.dispatcher,
             run=self.name,
             learner=self.config.learner,
-            rate_hz=self._pulse.rate_hz(self.dispatcher.book.tally.counted, now_s),
-            step_ms_max=1e3 * self._pulse.step_s_max,
+            vitals=self.vitals(),
         )
         self._outgoing.publish(shown)
         if self._on_status is not None:

@@ -85,11 +85,11 @@ def serve(
             owner.run()
         summary = summarise(
             config,
-            owner.dispatcher.book,
+            owner.dispatcher.desk,
             owner.recommendation,
             run=keys.run,
-            resends=owner.dispatcher.desk.resends,
             wall_s=time.monotonic() - started_s,
+            vitals=owner.vitals(),
             ending=owner.ending,
             why=owner.why,
         )

@@ -11,8 +11,9 @@ from typing import Any
 import msgspec
 
 from shearline.learner.base import Recommendation
-from shearline.learner.dispatcher.book import Book
+from shearline.learner.dispatcher.desk import Desk
 from shearline.learner.dispatcher.instructions import Ending
+from shearline.learner.dispatcher.status import Vitals
 from shearline.learner.run.config import RunConfig
 from shearline.protocol.errors import RecordError
 from shearline.protocol.messages import EpisodeClosed
@@ -47,6 +48,9 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
         counted: Trials with an outcome, ``late`` ones among them.
         lost: Trials without one.
         wall_s: How long this process worked on it [s].
+        step_ms_max: Longest step of the owner thread, by the wall [ms].
+        step_cpu_ms_max: Longest step, by the thread's processor time [ms].
+        step_cpu_ms_p99: What 99 % of the steps stayed within [ms].
     """
 
     run: str
@@ -62,6 +66,9 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     rejected: int
     recommendation: Advice | None
     wall_s: float
+    step_ms_max: float
+    step_cpu_ms_max: float
+    step_cpu_ms_p99: float
     state: Ending
     why: str
 
@@ -73,17 +80,17 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
 
 def summarise(
     config: RunConfig,
-    book: Book,
+    desk: Desk,
     recommendation: Recommendation | None,
     *,
     run: str,
-    resends: int,
     wall_s: float,
+    vitals: Vitals,
     ending: Ending,
     why: str,
 ) -> RunSummary:
-    """Return what the book, and the learner's last word, amount to."""
-    tally = book.tally
+    """Return what the desk, and the learner's last word, amount to."""
+    book, tally = desk.book, desk.book.tally
     return RunSummary(
         run=run,
         task=config.task.name,
@@ -92,12 +99,15 @@ def summarise(
         episodes=[_episode(closed) for closed in book.closed],
         counted=tally.counted,
         lost=tally.lost,
-        duplicates=tally.surplus + resends,
+        duplicates=tally.surplus + desk.resends,
         late=tally.late,
         aborted=tally.aborted,
         rejected=tally.rejected,
         recommendation=None if recommendation is None else _advice(config, recommendation),
         wall_s=wall_s,
+        step_ms_max=vitals.step_ms_max,
+        step_cpu_ms_max=vitals.step_cpu_ms_max,
+        step_cpu_ms_p99=vitals.step_cpu_ms_p99,
         state=ending,
         why=why,
     )
