@@ -37,7 +37,7 @@ from shearline.learner.run.journal import Journal as JournalFile
 from shearline.learner.run.outgoing import Outgoing
 from shearline.learner.run.pulse import Pulse
 from shearline.learner.run.signals import Hurry
-from shearline.protocol.intake import Arrival, Presence
+from shearline.protocol.link import Arrival, Presence
 from shearline.protocol.messages import Snapshot, Status
 
 #: Items taken in one step: one write for all of them, and a bound on how long a step takes.
