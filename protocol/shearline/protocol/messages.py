@@ -59,6 +59,14 @@ class CommandKind(enum.StrEnum):
     STOP = "stop"  # finish or abort what runs, then the run ends
 
 
+class Purpose(enum.StrEnum):
+    """What the trials of an episode are for; the learner hears of the first kind alone."""
+
+    LEARNING = "learning"
+    CONFIRMATION = "confirmation"  # the recommended tuple, again and again
+    REGION = "region"  # tuples drawn from the recommended region
+
+
 class Message(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", omit_defaults=False):
     """Base of all messages."""
 
@@ -223,6 +231,7 @@ class Proposed(Message, frozen=True, kw_only=True, tag="proposed"):
     episode: Count
     theta: Tuple
     seed: Seed
+    purpose: Purpose = Purpose.LEARNING
 
 
 class Counted(Message, frozen=True, kw_only=True, tag="counted"):
@@ -246,9 +255,11 @@ class Counted(Message, frozen=True, kw_only=True, tag="counted"):
     why: Text
     extras: Annotated[dict[str, float], Meta(max_length=64)]
     at_s: Seconds
+    purpose: Purpose = Purpose.LEARNING
 
 
-class EpisodeClosed(Message, frozen=True, kw_only=True, tag="episode"):
+# Journals hold this one as well: what has its default is left out, so that they stay as they were.
+class EpisodeClosed(Message, frozen=True, kw_only=True, tag="episode", omit_defaults=True):
     """An episode is complete.
 
     ``mean_cost`` is over all its counted trials, ``best_cost`` over its successes.
@@ -261,6 +272,7 @@ class EpisodeClosed(Message, frozen=True, kw_only=True, tag="episode"):
     mean_cost: float | None
     best_cost: float | None
     at_s: Seconds
+    purpose: Purpose = Purpose.LEARNING
 
 
 class EvaluatorState(Message, frozen=True, kw_only=True, tag="evaluator"):

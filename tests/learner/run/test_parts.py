@@ -73,7 +73,7 @@ def random_search() -> Learner:
 
 
 def test_a_fitter_answers_with_seeded_proposals_then_its_last_word() -> None:
-    first, _, last = answers(random_search, Ask(0, 4, ()))
+    first, _, last = answers(random_search, Ask(0, 4, (), 0))
     assert isinstance(first, ProposalsReady)
     assert [p.trial for p in first.trials] == [0, 1, 2, 3]
     assert [p.seed for p in first.trials] == [trial_seed(3, n) for n in range(4)]
@@ -89,7 +89,7 @@ def test_a_fitter_answers_with_seeded_proposals_then_its_last_word() -> None:
     ],
 )
 def test_a_learner_that_breaks_its_contract_fails_in_one_sentence(make: Any, why: str) -> None:
-    failed, last = answers(make, Ask(0, 4, ()))
+    failed, last = answers(make, Ask(0, 4, (), 0))
     assert isinstance(failed, LearnerFailed)
     assert why in failed.why
     assert last.recommendation is None
@@ -98,7 +98,7 @@ def test_a_learner_that_breaks_its_contract_fails_in_one_sentence(make: Any, why
 def test_a_run_that_another_learner_proposed_is_not_gone_on_with() -> None:
     lab = Lab(trials=4)
     lab.propose()
-    failed, _ = answers(random_search, Ask(1, 4, ()), lab.dispatcher.book)
+    failed, _ = answers(random_search, Ask(1, 4, (), 4), lab.dispatcher.book)
     assert "proposed by another version of the learner" in failed.why
 
 

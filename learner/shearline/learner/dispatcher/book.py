@@ -17,6 +17,7 @@ from shearline.learner.dispatcher.entries import (
     AttemptLapsed,
     AttemptReturned,
     AttemptRevived,
+    ConfirmationProposed,
     Entry,
     EpisodeDone,
     LapseReason,
@@ -38,7 +39,14 @@ from shearline.learner.dispatcher.states import (
     TrialState,
     advance,
 )
-from shearline.protocol.messages import CommandKind, EpisodeClosed, OutcomeKind, Result, Verdict
+from shearline.protocol.messages import (
+    CommandKind,
+    EpisodeClosed,
+    OutcomeKind,
+    Purpose,
+    Result,
+    Verdict,
+)
 
 #: States in which a trial of the open episode still keeps it open.
 UNSETTLED = frozenset({TrialState.PENDING, TrialState.LEASED})
@@ -116,6 +124,8 @@ class Book:
         self.episode: int | None = None
         self.unsettled = 0
         self.episodes: list[list[int]] = []
+        #: What every episode is for.
+        self.purposes: list[Purpose] = []
         #: Trials that went back to pending and were not looked at since.
         self.released: list[int] = []
         self.closed: list[EpisodeClosed] = []
@@ -157,7 +167,14 @@ class Book:
         self.epoch = entry.epoch
 
     def _proposed(self, entry: TrialsProposed) -> None:
+        self._open(entry, Purpose.LEARNING)
+
+    def _confirming(self, entry: ConfirmationProposed) -> None:
+        self._open(entry, entry.purpose)
+
+    def _open(self, entry: TrialsProposed, purpose: Purpose) -> None:
         self.episode = entry.episode
+        self.purposes.append(purpose)
         self.episodes.append([planned.trial for planned in entry.trials])
         self.unsettled = len(entry.trials)
         for p in entry.trials:
@@ -269,7 +286,8 @@ class Book:
         if trial.state is TrialState.LATE:
             self.tally.late += 1
             self.tally.lost -= 1
-        self.untold.append(Told(trial.number, result.cost, result.kind is OutcomeKind.SUCCESS))
+        if self.purposes[trial.episode] is Purpose.LEARNING:
+            self.untold.append(Told(trial.number, result.cost, result.kind is OutcomeKind.SUCCESS))
 
     def _note(self, trial: TrialRow, attempt: AttemptRow, entry: ResultTaken) -> None:
         if entry.excused:
@@ -297,6 +315,7 @@ _APPLY: dict[type[Entry], Callable[[Book, Any], None]] = {
     RunOpened: Book._opened,  # noqa: SLF001 - the table of the class's own methods
     LearnerBooted: Book._booted,  # noqa: SLF001
     TrialsProposed: Book._proposed,  # noqa: SLF001
+    ConfirmationProposed: Book._confirming,  # noqa: SLF001
     AttemptIssued: Book._issued,  # noqa: SLF001
     AttemptRevived: Book._revived,  # noqa: SLF001
     AttemptLapsed: Book._lapsed,  # noqa: SLF001

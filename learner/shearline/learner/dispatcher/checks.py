@@ -9,6 +9,7 @@ from shearline.learner.dispatcher.book import UNSETTLED, Book
 from shearline.learner.dispatcher.desk import Desk
 from shearline.learner.dispatcher.rules import ATTEMPTS_MAX, EVALUATORS_MAX, TURNAROUNDS_MAX
 from shearline.learner.dispatcher.states import AttemptState, TrialState
+from shearline.protocol.messages import Purpose
 
 #: Live attempts that one trial may have at once.
 LIVE_MAX = 2
@@ -48,6 +49,7 @@ def _check_trials(book: Book) -> None:
     assert all(t.episode == book.episode for t in unsettled), "a closed episode is open"
     assert book.episode in {None, len(book.closed)}, "an episode opened before another closed"
     assert len(book.episodes) == len(book.closed) + (book.episode is not None)
+    assert len(book.purposes) == len(book.episodes)
     for trial in book.trials.values():
         if trial.state in UNSETTLED:
             assert bool(trial.live) == (trial.state is TrialState.LEASED), f"trial {trial.number}"
@@ -63,7 +65,7 @@ def _check_attempts(book: Book) -> None:
 
 
 def _check_outcomes(book: Book) -> None:
-    """No trial is counted twice, and every outcome is told exactly once."""
+    """No trial is counted twice; what was learned from, and nothing else, is told exactly once."""
     done = {n for n, t in book.trials.items() if t.state in _DONE}
     lost = {n for n, t in book.trials.items() if t.state in {TrialState.LOST, TrialState.LEFT}}
     assert all((t.result is not None) == (n in done) for n, t in book.trials.items())
@@ -71,7 +73,8 @@ def _check_outcomes(book: Book) -> None:
     assert book.tally.lost == len(lost), "trials without one are miscounted"
     told = [tell.trial for batch in (*book.told, book.untold) for tell in batch]
     assert len(told) == len(set(told)), "an outcome was told twice"
-    assert set(told) == done, "outcomes and what was told disagree"
+    learning = {n for n in done if book.purposes[book.trials[n].episode] is Purpose.LEARNING}
+    assert set(told) == learning, "outcomes and what was told disagree"
     decided = [a.trial for a in book.attempts.values() if a.state is AttemptState.DECIDED]
     assert sorted(decided) == sorted(done), "a trial was decided by other than one attempt"
 

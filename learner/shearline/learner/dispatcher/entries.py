@@ -12,7 +12,7 @@ import enum
 import msgspec
 
 from shearline.learner.dispatcher.events import Planned
-from shearline.protocol.messages import CommandKind, EpisodeClosed, Result, Verdict
+from shearline.protocol.messages import CommandKind, EpisodeClosed, Purpose, Result, Verdict
 
 
 class LapseReason(enum.StrEnum):
@@ -54,6 +54,16 @@ class TrialsProposed(Entry, frozen=True, kw_only=True, tag="proposed"):
 
     episode: int
     trials: list[Planned]
+
+
+class ConfirmationProposed(TrialsProposed, frozen=True, kw_only=True, tag="confirming"):
+    """An episode opened whose outcomes the learner is never told.
+
+    An entry of its own, so that a version that does not know it refuses the journal rather than
+    teach the learner what it never asked for.
+    """
+
+    purpose: Purpose
 
 
 class AttemptIssued(Entry, frozen=True, kw_only=True, tag="issued"):
@@ -129,6 +139,7 @@ AnyEntry = (
     RunOpened
     | LearnerBooted
     | TrialsProposed
+    | ConfirmationProposed
     | AttemptIssued
     | AttemptLapsed
     | AttemptReturned

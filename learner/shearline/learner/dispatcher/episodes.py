@@ -3,6 +3,9 @@
 An episode closes when every trial of it has its outcome or is lost, or by configuration at a
 quorum after a deadline. Outcomes reach the learner in one piece with the next ask, ordered by
 trial number: the journal's order of arrival cannot change what it proposes.
+
+Behind the last episode of learning there may be others that only confirm what the learner
+recommends: handed out, counted and closed like any, but the learner is not told of them.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import math
 from shearline.learner.dispatcher.book import TrialRow
 from shearline.learner.dispatcher.desk import Desk
 from shearline.learner.dispatcher.entries import (
+    ConfirmationProposed,
     EpisodeDone,
     RunEnded,
     TrialLost,
@@ -26,6 +30,7 @@ from shearline.protocol.messages import (
     CommandKind,
     EpisodeClosed,
     OutcomeKind,
+    Purpose,
     clip,
 )
 
@@ -33,13 +38,15 @@ from shearline.protocol.messages import (
 def ask(desk: Desk) -> None:
     """Ask for the next episode, or end the run if there is none."""
     episode = len(desk.book.closed)
-    if episode >= desk.rules.episodes:
+    agenda = desk.rules.agenda(episode)
+    if agenda is None:
         desk.journal(RunEnded(at_s=desk.now_s, stimulus=desk.stimulus, ok=True, why=""))
         dismiss(desk, Ending.COMPLETE, "")
         return
     desk.asking = episode
+    purpose, trials = agenda
     tells = desk.book.told[-1] if desk.book.told else ()
-    desk.out.append(Ask(episode, desk.rules.trials, tells))
+    desk.out.append(Ask(episode, trials, tells, len(desk.book.trials), purpose))
 
 
 def propose(desk: Desk, event: ProposalsReady) -> None:
@@ -47,12 +54,18 @@ def propose(desk: Desk, event: ProposalsReady) -> None:
     if event.episode != desk.asking:
         return
     desk.asking = None
-    desk.journal(
-        TrialsProposed(
-            at_s=desk.now_s, stimulus=desk.stimulus, episode=event.episode, trials=event.trials
-        )
-    )
+    desk.journal(_opened(desk, event))
     desk.opened_s = desk.clock_s
+
+
+def _opened(desk: Desk, event: ProposalsReady) -> TrialsProposed:
+    at_s, stimulus, episode, trials = desk.now_s, desk.stimulus, event.episode, event.trials
+    purpose, _ = desk.rules.agenda(episode) or (Purpose.LEARNING, 0)
+    if purpose is Purpose.LEARNING:
+        return TrialsProposed(at_s=at_s, stimulus=stimulus, episode=episode, trials=trials)
+    return ConfirmationProposed(
+        at_s=at_s, stimulus=stimulus, episode=episode, trials=trials, purpose=purpose
+    )
 
 
 def settle(desk: Desk) -> None:
@@ -128,18 +141,21 @@ def _has_quorum(desk: Desk) -> bool:
 
 
 def _close(desk: Desk, episode: int) -> None:
-    rows = desk.book.rows(episode)
-    summary = summarise(episode, rows, desk.now_s)
+    rows, purpose = desk.book.rows(episode), desk.book.purposes[episode]
+    summary = summarise(episode, rows, desk.now_s, purpose)
     desk.journal(EpisodeDone(at_s=desk.now_s, stimulus=desk.stimulus, summary=summary))
-    desk.say(f"episode {episode} closed: {summary.successes} of {summary.trials} succeeded")
-    if summary.trials == 0:
+    name = f"episode {episode}" if purpose is Purpose.LEARNING else f"the trials of the {purpose}"
+    desk.say(f"{name} closed: {summary.successes} of {summary.trials} succeeded")
+    if summary.trials == 0 and purpose is Purpose.LEARNING:
         why = f"no trial of episode {episode} reached a verdict; trial {rows[-1].number} was"
         _fail(desk, f"{why} {rows[-1].why}: correct the task or its evaluators")
-    elif desk.state is not RunState.STOPPING or len(desk.book.closed) >= desk.rules.episodes:
+    elif desk.state is not RunState.STOPPING or desk.rules.agenda(episode + 1) is None:
         ask(desk)
 
 
-def summarise(episode: int, rows: list[TrialRow], at_s: float) -> EpisodeClosed:
+def summarise(
+    episode: int, rows: list[TrialRow], at_s: float, purpose: Purpose = Purpose.LEARNING
+) -> EpisodeClosed:
     """Return what an episode came to, over the trials that have an outcome."""
     results = [row.result for row in rows if row.result is not None]
     won = [r.cost for r in results if r.kind is OutcomeKind.SUCCESS]
@@ -151,4 +167,5 @@ def summarise(episode: int, rows: list[TrialRow], at_s: float) -> EpisodeClosed:
         mean_cost=math.fsum(r.cost for r in results) / len(results) if results else None,
         best_cost=min(won, default=None),
         at_s=at_s,
+        purpose=purpose,
     )

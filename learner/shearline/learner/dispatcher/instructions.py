@@ -12,7 +12,7 @@ import enum
 import msgspec
 
 from shearline.learner.dispatcher.entries import Entry
-from shearline.protocol.messages import Message
+from shearline.protocol.messages import Message, Purpose
 
 
 class Told(msgspec.Struct, frozen=True):
@@ -61,11 +61,21 @@ class Publish(Instruction, frozen=True):
 
 
 class Ask(Instruction, frozen=True):
-    """Tell the learner these outcomes, in this order, then ask it for an episode."""
+    """Tell the learner these outcomes, in this order, then ask it for an episode.
+
+    Attributes:
+        episode: Its number.
+        trials: How many trials it is to have.
+        tells: Outcomes since the last ask.
+        first: Number of its first trial.
+        purpose: What it is for; anything but learning is about what the learner recommends.
+    """
 
     episode: int
     trials: int
     tells: tuple[Told, ...]
+    first: int
+    purpose: Purpose = Purpose.LEARNING
 
 
 class Say(Instruction, frozen=True):

@@ -42,16 +42,19 @@ def messages(book: Book, entry: Entry) -> list[Message]:
     if isinstance(entry, ResultTaken):
         return _of_result(book, entry)
     if isinstance(entry, TrialsProposed):
+        purpose = book.purposes[entry.episode]
         return [
-            Proposed(trial=p.trial, episode=entry.episode, theta=p.theta, seed=p.seed)
+            Proposed(
+                trial=p.trial, episode=entry.episode, theta=p.theta, seed=p.seed, purpose=purpose
+            )
             for p in entry.trials
         ]
     if isinstance(entry, TrialLost):
-        return [_lost(book.trials[entry.trial], entry.why, entry.at_s)]
+        return [_lost(book, book.trials[entry.trial], entry.why, entry.at_s)]
     if isinstance(entry, EpisodeDone):
         left = [r for r in book.rows(entry.summary.episode) if r.state is TrialState.LEFT]
         why = "its episode closed without it"
-        return [*(_lost(row, why, entry.at_s) for row in left), entry.summary]
+        return [*(_lost(book, row, why, entry.at_s) for row in left), entry.summary]
     return []
 
 
@@ -77,11 +80,12 @@ def _of_result(book: Book, entry: ResultTaken) -> list[Message]:
             why=result.why,
             extras=result.extras,
             at_s=entry.at_s,
+            purpose=book.purposes[trial.episode],
         )
     ]
 
 
-def _lost(trial: TrialRow, why: str, at_s: float) -> Counted:
+def _lost(book: Book, trial: TrialRow, why: str, at_s: float) -> Counted:
     return Counted(
         trial=trial.number,
         episode=trial.episode,
@@ -98,4 +102,5 @@ def _lost(trial: TrialRow, why: str, at_s: float) -> Counted:
         why=why,
         extras={},
         at_s=at_s,
+        purpose=book.purposes[trial.episode],
     )

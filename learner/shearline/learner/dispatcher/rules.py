@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shearline.protocol.messages import TaskSpec
+from shearline.protocol.messages import Purpose, TaskSpec
 
 #: Evaluators known at once; more are refused, so that no table grows without bound.
 EVALUATORS_MAX = 4096
@@ -47,6 +47,8 @@ class Rules:
         aborts_max: A trial aborted or rejected so often is lost.
         stop_grace_s: How long a stop waits for what runs [s].
         kinds: Kinds of evaluators that may take part; all if empty.
+        confirm: Trials of the recommended tuple once the last episode has closed.
+        confirm_region: Trials of tuples drawn from the recommended region, after those.
     """
 
     task: TaskSpec
@@ -60,3 +62,18 @@ class Rules:
     aborts_max: int = 3
     stop_grace_s: float = 5.0
     kinds: tuple[str, ...] = ()
+    confirm: int = 0
+    confirm_region: int = 0
+
+    def agenda(self, episode: int) -> tuple[Purpose, int] | None:
+        """Return what an episode is for and how many trials it has; ``None`` behind the last."""
+        if episode < self.episodes:
+            return Purpose.LEARNING, self.trials
+        after = episode - self.episodes
+        confirming = self.confirming()
+        return confirming[after] if after < len(confirming) else None
+
+    def confirming(self) -> tuple[tuple[Purpose, int], ...]:
+        """Return what follows the last episode of learning: what it is for, and its trials."""
+        asked = ((Purpose.CONFIRMATION, self.confirm), (Purpose.REGION, self.confirm_region))
+        return tuple((purpose, trials) for purpose, trials in asked if trials)

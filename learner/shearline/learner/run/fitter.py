@@ -3,6 +3,9 @@
 Work goes in by method calls, answers come back as events in the inbox, in the same order. A run
 that is resumed is rehearsed first: the learner is asked and told everything again, and must
 propose again what the journal says it did.
+
+What the learner recommends when its last episode has closed is its last word if that is to be
+confirmed: later outcomes no longer change it.
 """
 
 from __future__ import annotations
@@ -16,15 +19,16 @@ from queue import SimpleQueue
 
 import numpy as np
 
-from shearline.learner.base import Learner, Recommendation
+from shearline.learner.base import Array, Learner, Recommendation
+from shearline.learner.confirmation import tuples
 from shearline.learner.dispatcher.book import Book
 from shearline.learner.dispatcher.events import LearnerFailed, Planned, ProposalsReady
 from shearline.learner.dispatcher.instructions import Ask, Told
 from shearline.learner.errors import LearnerError
-from shearline.learner.run.inbox import Inbox
 from shearline.learner.run.seeds import trial_seed
 from shearline.protocol.errors import ShearlineError
-from shearline.protocol.messages import clip
+from shearline.protocol.link import Sink
+from shearline.protocol.messages import Purpose, clip
 
 #: Proposals this close to the journal's are the same ones; linear algebra may differ in last bits.
 _SAME = 1e-9
@@ -54,18 +58,22 @@ class Fitter:
         inbox: Where answers go.
     """
 
-    def __init__(self, make: Callable[[], Learner], seed: int, inbox: Inbox) -> None:
+    def __init__(self, make: Callable[[], Learner], seed: int, inbox: Sink) -> None:
         self._make = make
         self._seed = seed
         self._inbox = inbox
         self._jobs: SimpleQueue[Callable[[Learner], None] | None] = SimpleQueue()
+        self._last_word: Recommendation | None = None
         self._thread = threading.Thread(target=self._work, name="fitter", daemon=True)
 
     def start(self, book: Book) -> None:
         """Start, on what the journal says happened so far."""
-        episodes = [[(n, book.trials[n].theta) for n in numbers] for numbers in book.episodes]
+        episodes = [
+            (purpose, [(n, book.trials[n].theta) for n in numbers])
+            for purpose, numbers in zip(book.purposes, book.episodes, strict=True)
+        ]
         told = list(book.told)
-        self._jobs.put(lambda learner: _rehearse(learner, episodes, told))
+        self._jobs.put(lambda learner: self._rehearse(learner, episodes, told))
         self._thread.start()
 
     def ask(self, ask: Ask) -> None:
@@ -89,25 +97,59 @@ class Fitter:
 
     def _ask(self, learner: Learner, ask: Ask) -> None:
         _tell(learner, ask.tells)
-        proposals = learner.ask(ask.trials)
-        first = ask.episode * ask.trials
-        if [p.trial for p in proposals] != list(range(first, first + ask.trials)):
-            raise LearnerError(f"expected trials from {first} on, got other numbers")
-        if not all(learner.space.contains(p.theta) for p in proposals):
+        thetas = self._propose(learner, ask.purpose, ask.trials, ask.first)
+        if not all(learner.space.contains(theta) for theta in thetas):
             raise LearnerError(f"a proposal of episode {ask.episode} is out of bounds")
         planned = [
-            Planned(p.trial, p.theta.tolist(), trial_seed(self._seed, p.trial)) for p in proposals
+            Planned(n, theta.tolist(), trial_seed(self._seed, n))
+            for n, theta in enumerate(thetas, ask.first)
         ]
         self._inbox.put(ProposalsReady(ask.episode, planned))
-        self._inbox.put(Modelled(ask.episode, model_json(learner)))
+        if ask.purpose is Purpose.LEARNING:
+            self._inbox.put(Modelled(ask.episode, model_json(learner)))
+
+    def _propose(self, learner: Learner, purpose: Purpose, trials: int, first: int) -> list[Array]:
+        """Return the tuples of an episode: the learner's own, or what is to be confirmed."""
+        if purpose is not Purpose.LEARNING:
+            self._last_word = self._last_word or learner.recommend()
+            return tuples(self._last_word, purpose, trials, self._seed)
+        proposals = learner.ask(trials)
+        if [p.trial for p in proposals] != list(range(first, first + trials)):
+            raise LearnerError(f"expected trials from {first} on, got other numbers")
+        return [p.theta for p in proposals]
 
     def _finish(self, learner: Learner, tells: Sequence[Told]) -> None:
         _tell(learner, tells)
         try:
-            recommendation = learner.recommend()
+            last_word = self._last_word or learner.recommend()
         except LearnerError:  # nothing was ever asked for
-            recommendation = None
-        self._inbox.put(Recommended(recommendation))
+            last_word = None
+        self._inbox.put(Recommended(last_word))
+
+    def _rehearse(
+        self,
+        learner: Learner,
+        episodes: list[tuple[Purpose, list[tuple[int, list[float]]]]],
+        told: list[tuple[Told, ...]],
+    ) -> None:
+        """Bring a fresh learner to where the journal ends.
+
+        Raises:
+            LearnerError: If it proposes other than it did: outcomes would then be credited to
+                tuples that were never tried.
+        """
+        scale = learner.space.high - learner.space.low
+        for episode, (purpose, trials) in enumerate(episodes):
+            if episode:
+                _tell(learner, told[episode - 1])
+            first = trials[0][0] if trials else 0  # without a region there is nothing to draw from
+            thetas = self._propose(learner, purpose, len(trials), first)
+            for (number, theta), again in zip(trials, thetas, strict=True):
+                if np.any(np.abs(again - theta) > _SAME * scale):
+                    raise LearnerError(
+                        f"trial {number} of this run was proposed by another version of the"
+                        " learner: resume it with that version, or start a new run"
+                    )
 
 
 def model_json(learner: Learner) -> str:
@@ -130,27 +172,3 @@ def _plain(value: object) -> object:
 def _tell(learner: Learner, tells: Sequence[Told]) -> None:
     for told in tells:
         learner.tell(told.trial, cost=told.cost, success=told.success)
-
-
-def _rehearse(
-    learner: Learner,
-    episodes: list[list[tuple[int, list[float]]]],
-    told: list[tuple[Told, ...]],
-) -> None:
-    """Bring a fresh learner to where the journal ends.
-
-    Raises:
-        LearnerError: If it proposes other than it did: outcomes would then be credited to tuples
-            that were never tried.
-    """
-    scale = learner.space.high - learner.space.low
-    for episode, trials in enumerate(episodes):
-        if episode:
-            _tell(learner, told[episode - 1])
-        proposals = learner.ask(len(trials))
-        for (number, theta), proposal in zip(trials, proposals, strict=True):
-            if np.any(np.abs(proposal.theta - theta) > _SAME * scale):
-                raise LearnerError(
-                    f"trial {number} of this run was proposed by another version of the learner:"
-                    " resume it with that version, or start a new run"
-                )
