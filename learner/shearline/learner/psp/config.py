@@ -7,10 +7,10 @@ docs/learners.md has the figures behind each default.
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Self
 
-from shearline.learner.errors import SwitchError
+from shearline.learner.switches import check, having
 
 
 class MixtureData(enum.StrEnum):
@@ -152,32 +152,8 @@ class PSPConfig:
         Raises:
             SwitchError: If there is no such switch or it has no such value.
         """
-        known = {f.name: getattr(self, f.name) for f in fields(self)}
-        for name, value in switches.items():
-            if name not in known:
-                raise SwitchError(f"psp has no switch {name!r}: expected one of {', '.join(known)}")
-            known[name] = _like(name, known[name], value)
-        return type(self)(**known)
+        return having(self, "psp", switches)
 
 
-def _like(name: str, default: object, value: object) -> object:
-    """Return a value of the kind that a switch's default has."""
-    if isinstance(default, enum.StrEnum):
-        allowed = [str(member) for member in type(default)]
-        _check(value in allowed, name, f"one of {', '.join(allowed)}", value)
-        return type(default)(str(value))
-    match default, value:
-        case (bool(), bool()) | (tuple(), tuple()):
-            return value
-        case (tuple(), list()):
-            return tuple(value)
-        case (float(), int() | float()) if not isinstance(value, bool):
-            return float(value)
-        case (int(), int()) if isinstance(default, bool) == isinstance(value, bool):
-            return value
-    raise SwitchError(f"psp's switch {name!r} takes a value like {default!r}, got {value!r}")
-
-
-def _check(holds: bool, name: str, expected: str, got: object) -> None:  # noqa: FBT001
-    if not holds:
-        raise SwitchError(f"psp's switch {name!r} takes {expected}, got {got!r}")
+def _check(holds: bool, name: str, expected: str, got: object) -> None:  # noqa: FBT001 - as in an assertion
+    check(holds, "psp", name, expected, got)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from shearline.learner.psp.partition import Partition
 from shearline.learner.psp.proposal import draw_inside
 from shearline.learner.psp.reward import rewards
 from shearline.learner.recommend import Focus
+from shearline.learner.switches import plain
 from shearline.protocol.space import Space
 
 #: Proposals judged at a time; the first accepted one of a block is applied.
@@ -90,7 +91,7 @@ class PSP(EpisodicLearner):
         worth = rewards(belief.trials, self.config.reward)
         proposal = "mixture" if belief.mixture else "uniform"
         return {
-            "config": {name: _plain(value) for name, value in asdict(self.config).items()},
+            "config": plain(self.config),
             "proposal": "lhs" if self._design is not None else proposal,
             "threshold_cost": _finite(belief.threshold_cost),
             "mean_reward": float(worth[belief.good].mean()) if belief.good.any() else 0.0,
@@ -104,15 +105,6 @@ class PSP(EpisodicLearner):
                 "good": belief.good.tolist(),
             },
         }
-
-
-def _plain(value: object) -> object:
-    match value:
-        case tuple():
-            return list(value)
-        case str():
-            return str(value)
-    return value
 
 
 def _finite(value: float) -> float | None:
