@@ -8,7 +8,7 @@ from typing import Self
 from rich.console import Console
 from rich.live import Live
 
-from shearline.deploy.table import number, render
+from shearline.deploy.table import episode_name, number, render
 from shearline.protocol.messages import Status
 
 
@@ -40,7 +40,7 @@ class LiveShow:
             return
         for episode in status.history[self._episodes_said :]:
             self._console.print(
-                f"episode {episode.episode + 1}/{status.episodes}:"
+                f"{episode_name(episode, status.episodes)}:"
                 f" {episode.success_rate:.0%} success, mean cost {number(episode.mean_cost)},"
                 f" best {number(episode.best_cost)}"
             )

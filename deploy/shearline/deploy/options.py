@@ -76,6 +76,18 @@ def add_run(command: argparse.ArgumentParser) -> None:
     group.add_argument("--episodes", type=positive, metavar="K", help="updates (default 10)")
     group.add_argument("--trials", type=positive, metavar="N", help="per episode (default 20)")
     group.add_argument("--seed", type=at_least(0), metavar="S", help="default 0")
+    group.add_argument(
+        "--confirm",
+        type=at_least(0),
+        metavar="N",
+        help="then try the recommended tuple N times on fresh noise, and say how often it worked",
+    )
+    group.add_argument(
+        "--confirm-region",
+        type=at_least(0),
+        metavar="N",
+        help="and N tuples drawn from the recommended region",
+    )
     group.add_argument("--lease", type=seconds, metavar="S", help="lease of an attempt [s]")
     group.add_argument("--out", metavar="RUN_DIR", help="run folder (default runs/TASK-TIME)")
     group.add_argument("--no-record", action="store_true", help="write no record.mcap")
@@ -94,6 +106,8 @@ def run_arguments(arguments: argparse.Namespace) -> list[str]:
         "--episodes": arguments.episodes,
         "--trials": arguments.trials,
         "--seed": arguments.seed,
+        "--confirm": arguments.confirm,
+        "--confirm-region": arguments.confirm_region,
         "--lease": arguments.lease,
     }
     words = [str(arguments.config)] if arguments.config is not None else []

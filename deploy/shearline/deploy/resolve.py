@@ -26,6 +26,8 @@ OVERRIDES = {
     "episodes": "episodes",
     "trials": "trials",
     "seed": "seed",
+    "confirm": "confirm",
+    "confirm_region": "confirm_region",
     "lease": "lease_s",
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import sys
 from collections.abc import Mapping
@@ -12,6 +13,12 @@ from rich.console import Console
 from rich.table import Table
 
 from shearline.deploy.table import duration, number
+
+#: What each confirmation tried, by its name in the summary.
+CONFIRMATIONS = {
+    "confirmation": "the recommended tuple",
+    "region_confirmation": "tuples drawn from the region",
+}
 
 #: Columns of a page that is not a terminal.
 PIPE_COLUMNS = 110
@@ -44,7 +51,11 @@ def print_summary(summary: Mapping[str, Any], run_dir: Path, units: Mapping[str,
     if summary["state"] != "complete":
         console.print(f"stopped: {summary['why']}; the same command with --out {run_dir} goes on")
     if summary.get("recommendation"):
-        console.print(_recommendation(summary["recommendation"], units))
+        console.print(_recommendation(summary["recommendation"]))
+        console.print(_tuple(summary["recommendation"], units))
+    for name, tried in CONFIRMATIONS.items():
+        if summary.get(name):
+            console.print(_confirmation(summary[name], tried))
     console.print(f"\nreplay it in Rerun   {_ourselves()} view {run_dir}", soft_wrap=True)
     console.print(f"list its trials      {_ourselves()} trials {run_dir} --json", soft_wrap=True)
 
@@ -74,18 +85,48 @@ def _episodes(summary: Mapping[str, Any]) -> Table:
     return table
 
 
-def _recommendation(said: Mapping[str, Any], units: Mapping[str, str]) -> Table:
+def _recommendation(said: Mapping[str, Any]) -> str:
     low, high = said["interval"]
-    table = Table(
-        title=f"\nrecommended: succeeds with probability {said['success_probability']:.2f}"
-        f" (95 % interval {low:.2f} to {high:.2f}), cost about {number(said['cost'])}",
-        title_justify="left",
-        box=None,
-        padding=(0, 2),
-        show_header=False,
+    text = (
+        f"\nrecommended: succeeds with probability {said['success_probability']:.2f}"
+        f" ({low:.2f} to {high:.2f} at 95 %), cost about {number(said['cost'])}"
     )
+    region = said.get("region")
+    if region:
+        text += (
+            "\nthe region around it, as wide as said behind ± (one standard deviation):"
+            f" draws succeed with at least {region['success_low']:.2f}"
+        )
+    return text
+
+
+def _tuple(said: Mapping[str, Any], units: Mapping[str, str]) -> Table:
+    table = Table(box=None, padding=(0, 2), show_header=False)
     columns = 3
-    cells = [f"{name} {value:.4g} {units.get(name, '')}" for name, value in said["theta"].items()]
+    cells = [
+        f"{name} {value:.4g}{_spread(said.get('region'), name)} {units.get(name, '')}"
+        for name, value in said["theta"].items()
+    ]
     for start in range(0, len(cells), columns):
         table.add_row(*cells[start : start + columns])
     return table
+
+
+def _spread(region: Mapping[str, Any] | None, name: str) -> str:
+    """Return one parameter's standard deviation over the region, where bounds do not cut it."""
+    if region is None:
+        return ""
+    radius: Mapping[str, float] = region["radius"]
+    return f" ± {radius[name] / math.sqrt(len(radius) + 2):.2g}"
+
+
+def _confirmation(said: Mapping[str, Any], tried: str) -> str:
+    """Say what fresh trials came to, beside what was claimed."""
+    low, high = said["interval"]
+    lost = f", {said['lost']} lost" if said["lost"] else ""
+    verdict = "which bears out" if said["bears_out"] else "which does NOT bear out"
+    return (
+        f"\nconfirmed: {tried} succeeded in {said['successes']} of {said['trials']} fresh trials"
+        f"{lost}: {low:.2f} to {high:.2f} at 95 %,\n{verdict} the claim of at least"
+        f" {said['claimed']:.2f}; mean cost {number(said['mean_cost'])}"
+    )

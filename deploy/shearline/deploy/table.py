@@ -9,7 +9,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from shearline.protocol.messages import EpisodeClosed, EvaluatorState, Status
+from shearline.protocol.messages import EpisodeClosed, EvaluatorState, Purpose, Status
 
 #: Episodes shown at once; the last ones matter.
 EPISODES_SHOWN = 12
@@ -36,8 +36,20 @@ def render(status: Status) -> RenderableType:
 
 def time_left_s(status: Status) -> float:
     """Return the time left at the present rate [s]; infinite while nothing is known."""
-    left = status.episodes * status.trials_per_episode - status.counted - status.lost
+    left = trials_asked(status) - status.counted - status.lost
     return left / status.rate_hz if status.rate_hz > 0.0 else math.inf
+
+
+def trials_asked(status: Status) -> int:
+    """Return how many trials the whole run has, those that only confirm among them."""
+    return status.episodes * status.trials_per_episode + status.confirming
+
+
+def episode_name(episode: EpisodeClosed, episodes: int) -> str:
+    """Return what people call a closed episode: ``episode 3/10``, or what its trials confirm."""
+    if episode.purpose is Purpose.LEARNING:
+        return f"episode {episode.episode + 1}/{episodes}"
+    return "confirmation" if episode.purpose is Purpose.CONFIRMATION else "region"
 
 
 def duration(time_s: float) -> str:
@@ -70,7 +82,7 @@ def _headline(status: Status) -> Text:
 
 def _progress(status: Status) -> Table:
     row = Table.grid(padding=(0, 2))
-    total = max(1, status.episodes * status.trials_per_episode)
+    total = max(1, trials_asked(status))
     done = status.counted + status.lost
     row.add_row(
         ProgressBar(total=total, completed=min(done, total), width=40),
@@ -101,7 +113,7 @@ def _episodes(status: Status) -> Table:
 
 def _episode_row(episode: EpisodeClosed, episodes: int) -> tuple[RenderableType, ...]:
     return (
-        f"{episode.episode + 1}/{episodes}",
+        episode_name(episode, episodes).removeprefix("episode "),
         f"{episode.success_rate:.0%}",
         ProgressBar(total=1.0, completed=episode.success_rate, width=20),
         number(episode.mean_cost),

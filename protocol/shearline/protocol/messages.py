@@ -317,6 +317,7 @@ class Status(Message, frozen=True, kw_only=True, tag="status"):
         step_cpu_ms_p99: What 99 % of its steps stayed within [ms].
         malformed: Messages that the protocol does not allow, heard in this epoch.
         dropped: Messages that found the inbox crowded, in this epoch.
+        confirming: Trials that follow the last episode to confirm what was recommended.
     """
 
     run: Text
@@ -346,6 +347,7 @@ class Status(Message, frozen=True, kw_only=True, tag="status"):
     step_cpu_ms_p99: float = 0.0
     malformed: Count = 0
     dropped: Count = 0
+    confirming: Count = 0
 
 
 class TraceData(Message, frozen=True, kw_only=True, tag="trace"):

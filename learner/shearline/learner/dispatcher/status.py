@@ -47,6 +47,7 @@ def status(dispatcher: Dispatcher, *, run: str, learner: str, vitals: Vitals) ->
         episode=max(len(book.episodes) - 1, 0),
         episodes=desk.rules.episodes,
         trials_per_episode=desk.rules.trials,
+        confirming=sum(trials for _, trials in desk.rules.confirming()),
         pending=pending,
         leased=leased,
         done=len(states) - pending - leased,

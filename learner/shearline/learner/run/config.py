@@ -41,6 +41,9 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         aborts_max: Attempts of one trial that may be aborted or rejected before it does.
         stop_grace_s: How long a stop waits for what runs [s].
         kinds: Kinds of evaluators that may take part; all if empty.
+        confirm: Trials spent on the recommended tuple once the last episode has closed; the
+            learner is not told of them.
+        confirm_region: Trials spent on draws from the recommended region after those, likewise.
         record: Whether the run is recorded beside its journal.
         durable: Whether an acknowledged result survives a power cut, not only the process: each
             step of the learner then waits for the disk.
@@ -59,6 +62,8 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     aborts_max: Annotated[int, Meta(ge=1, le=50)] = 3
     stop_grace_s: Annotated[float, Meta(ge=0.0, le=3600.0)] = 5.0
     kinds: tuple[Literal["simulator", "function", "robot"], ...] = ()
+    confirm: Annotated[int, Meta(ge=0, le=TRIALS_MAX)] = 0
+    confirm_region: Annotated[int, Meta(ge=0, le=TRIALS_MAX)] = 0
     record: bool = True
     durable: bool = False
 
@@ -85,6 +90,8 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             aborts_max=self.aborts_max,
             stop_grace_s=self.stop_grace_s,
             kinds=self.kinds,
+            confirm=self.confirm,
+            confirm_region=self.confirm_region,
         )
 
 
@@ -136,7 +143,7 @@ def difference(asked: RunConfig, found: RunConfig) -> str:
 
     What only decides how it is run (leases, speculation, record) may change at a resume.
     """
-    for field in ("learner", "episodes", "trials", "seed"):
+    for field in ("learner", "episodes", "trials", "seed", "confirm", "confirm_region"):
         was, wanted = getattr(found, field), getattr(asked, field)
         if was != wanted:
             return f"its {field} is {was!r}, not {wanted!r}"

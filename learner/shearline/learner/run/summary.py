@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from pathlib import Path
 from typing import Any
@@ -14,18 +13,10 @@ from shearline.learner.base import Recommendation
 from shearline.learner.dispatcher.desk import Desk
 from shearline.learner.dispatcher.instructions import Ending
 from shearline.learner.dispatcher.status import Vitals
+from shearline.learner.run.advice import Advice, Confirmed, advice, confirmed
 from shearline.learner.run.config import RunConfig
 from shearline.protocol.errors import RecordError
-from shearline.protocol.messages import EpisodeClosed
-
-
-class Advice(msgspec.Struct, frozen=True, kw_only=True):
-    """The recommended tuple by name, and what may be expected of it; costs may be unknown."""
-
-    theta: dict[str, float]
-    success_probability: float
-    interval: tuple[float, float]
-    cost: float | None
+from shearline.protocol.messages import EpisodeClosed, Purpose
 
 
 class EpisodeSummary(msgspec.Struct, frozen=True, kw_only=True):
@@ -45,7 +36,10 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         state: How it ended; a stopped run can be resumed.
         why: One sentence unless complete.
-        counted: Trials with an outcome, ``late`` ones among them.
+        episodes: Those that the learner learned from.
+        confirmation: Fresh trials of the recommended tuple, if they were asked for.
+        region_confirmation: Fresh trials of draws from the recommended region, likewise.
+        counted: Trials with an outcome, ``late`` ones and those of a confirmation among them.
         lost: Trials without one.
         wall_s: How long this process worked on it [s].
         step_ms_max: Longest step of the owner thread, by the wall [ms].
@@ -65,6 +59,8 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     aborted: int
     rejected: int
     recommendation: Advice | None
+    confirmation: Confirmed | None
+    region_confirmation: Confirmed | None
     wall_s: float
     step_ms_max: float
     step_cpu_ms_max: float
@@ -96,14 +92,16 @@ def summarise(
         task=config.task.name,
         learner=config.learner,
         seed=config.seed,
-        episodes=[_episode(closed) for closed in book.closed],
+        episodes=[_episode(c) for c in book.closed if c.purpose is Purpose.LEARNING],
         counted=tally.counted,
         lost=tally.lost,
         duplicates=tally.surplus + desk.resends,
         late=tally.late,
         aborted=tally.aborted,
         rejected=tally.rejected,
-        recommendation=None if recommendation is None else _advice(config, recommendation),
+        recommendation=None if recommendation is None else advice(config.space, recommendation),
+        confirmation=confirmed(book, recommendation, Purpose.CONFIRMATION),
+        region_confirmation=confirmed(book, recommendation, Purpose.REGION),
         wall_s=wall_s,
         step_ms_max=vitals.step_ms_max,
         step_cpu_ms_max=vitals.step_cpu_ms_max,
@@ -141,14 +139,4 @@ def _episode(closed: EpisodeClosed) -> EpisodeSummary:
         success_rate=closed.success_rate,
         mean_cost=closed.mean_cost,
         best_cost=closed.best_cost,
-    )
-
-
-def _advice(config: RunConfig, found: Recommendation) -> Advice:
-    low, high = found.interval
-    return Advice(
-        theta=config.space.to_dict(found.theta),
-        success_probability=float(found.success_probability),
-        interval=(float(low), float(high)),
-        cost=float(found.cost) if math.isfinite(found.cost) else None,
     )
