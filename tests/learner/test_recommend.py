@@ -7,10 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shearline.learner.interval import clopper_pearson_low
 from shearline.learner.ledger import Trials
 from shearline.learner.recommend import (
+    NEIGHBOURHOOD,
     ON_POLICY_TRIALS,
+    REACHES,
     Focus,
+    _as_far_out,
     elite_focus,
     recommendation,
 )
@@ -63,14 +67,65 @@ def test_before_any_success_the_middle_of_the_box_is_all_there_is() -> None:
     assert focus.centre.tolist() == [0.5, 0.5]
 
 
-def test_a_region_of_the_policys_own_spread_claims_what_the_policy_reached() -> None:
-    trials = trials_around(60, 57)
+@given(
+    count=st.integers(0, 60), seed=st.integers(0, 50), reach=st.sampled_from((0.3, 0.5, 1.0, 2.0))
+)
+def test_a_region_is_held_to_trials_as_far_out_as_its_own_draws(
+    count: int, seed: int, reach: float
+) -> None:
+    distance = np.random.default_rng(seed).exponential(1.0, count)
+    held = distance[_as_far_out(distance, reach)]
+    near = distance[distance <= NEIGHBOURHOOD * reach]
+    assert set(held) <= set(near)
+    if len(held):
+        assert np.sqrt(np.mean(held**2)) >= reach * (1 - 1e-12)
+        assert held.min() == np.sort(near)[::-1][: len(held)].min()
+    if len(held) < len(near):
+        one_more = np.sort(near)[::-1][: len(held) + 1]
+        assert np.sqrt(np.mean(one_more**2)) < reach
+
+
+def test_where_all_succeed_the_region_has_the_spread_of_the_policy() -> None:
+    trials = trials_around(60, 60)
     region = recommendation(SPACE, trials, MIDDLE).region
     assert region is not None
     draws = SPACE.normalise(region.sample(np.random.default_rng(0), 4000))
     np.testing.assert_allclose(draws.std(axis=0), MIDDLE.scale, rtol=0.05)
-    assert region.success_low == recommendation(SPACE, trials, MIDDLE).interval[0]
-    assert (region.trials, region.successes) == (60, 57)
+    assert region.trials == region.successes
+    shared_out = 1 - 0.05 / len(REACHES)
+    assert region.success_low == clopper_pearson_low(region.trials, region.trials, shared_out)
+
+
+def test_where_only_the_inside_succeeds_the_region_is_small() -> None:
+    rng = np.random.default_rng(1)
+    u = 0.5 + MIDDLE.scale * rng.standard_normal((60, 2))
+    success = MIDDLE.distance(u) < 1.0
+    trials = Trials(np.arange(60), u, np.where(success, 0.5, 14.8), success)
+    region = recommendation(SPACE, trials, MIDDLE).region
+    assert region is not None
+    widest = 2.0 * MIDDLE.scale * np.array([10.0, 2.0])
+    np.testing.assert_allclose(region.radius, REACHES[0] * widest)
+    assert region.success_low > recommendation(SPACE, trials, MIDDLE).interval[0]
+
+
+@given(wins=st.integers(2, 60), seed=st.integers(0, 20))
+def test_a_region_never_claims_more_than_its_own_trials_support(wins: int, seed: int) -> None:
+    region = recommendation(SPACE, trials_around(60, wins, seed), MIDDLE).region
+    if region is not None:
+        assert region.success_low < region.successes / region.trials
+        assert region.contains(recommendation(SPACE, trials_around(60, wins, seed), MIDDLE).theta)
+
+
+def test_the_cost_of_the_middle_is_told_from_the_costs_around_it() -> None:
+    trials = trials_around(60, 60)
+    bowl = Trials(
+        trials.number, trials.u, 0.3 + 0.2 * MIDDLE.distance(trials.u) ** 2, trials.success
+    )
+    assert recommendation(SPACE, bowl, MIDDLE).cost == pytest.approx(
+        max(0.3, bowl.cost.min()), abs=1e-9
+    )
+    hill = Trials(trials.number, trials.u, 9.0 - MIDDLE.distance(trials.u), trials.success)
+    assert hill.cost.min() <= recommendation(SPACE, hill, MIDDLE).cost <= hill.cost.max()
 
 
 def test_a_single_success_makes_no_region() -> None:

@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from shearline.learner.base import Array, Recommendation
 from shearline.learner.interval import CONFIDENCE, clopper_pearson_low
@@ -21,6 +22,14 @@ from shearline.protocol.space import Space
 #: Trials that count as drawn from the present policy. 60 of 60 support a claim of .951, 30 of 30
 #: one of .905; many more would reach back to episodes that were drawn elsewhere.
 ON_POLICY_TRIALS = 60
+#: Share of the recent successes, nearest first, that the expected cost rests on.
+NEAR_SHARE = 0.75
+#: Sizes of regions that are weighed, in multiples of the policy's own spread.
+REACHES = (0.5, 1.0, 2.0)
+#: Trials farther out than so many reaches say nothing about a region.
+NEIGHBOURHOOD = 2.0
+#: A larger region is preferred to a better one if its bound is no worse than this share of it.
+GIVE = 0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,30 +93,70 @@ def recommendation(space: Space, trials: Trials, focus: Focus) -> Recommendation
 
 
 def _expected_cost(recent: Trials, focus: Focus) -> float:
-    """Return the mean cost of the nearer half of the recent successes; ``nan`` without any."""
+    """Return what a success in the middle is expected to cost; ``nan`` without any success.
+
+    The costs of the recent successes are fitted by ``a + b d^2``, with ``d`` the distance from
+    the middle and ``b`` no less than 0, over the nearer ``NEAR_SHARE`` of them; ``a`` is what is
+    expected, but no less than the cheapest of them.
+    """
     won = recent.where(recent.success)
     if not len(won):
         return math.nan
-    order = np.argsort(focus.distance(won.u), kind="stable")
-    return float(won.cost[order[: (len(won) + 1) // 2]].mean())
+    square = focus.distance(won.u) ** 2
+    near = np.argsort(square, kind="stable")[: max(1, round(NEAR_SHARE * len(won)))]
+    x, cost = square[near], won.cost[near]
+    offset = x - x.mean()
+    variance = float(offset @ offset)
+    slope = max(0.0, float(offset @ cost) / variance) if variance > 0.0 else 0.0
+    return max(float(cost.mean()) - slope * float(x.mean()), float(cost.min()))
 
 
 def claimed_region(space: Space, recent: Trials, focus: Focus) -> Region | None:
-    """Return the ellipsoid with the spread of the policy, held to the policy's own success.
+    """Return the largest ellipsoid whose success is about as well supported as that of any.
 
-    Uniform draws from an ellipsoid of half axes ``sqrt(n + 2) scale`` have the standard
-    deviations ``scale``. ``None`` below two successes.
+    Ellipsoids of a few fixed sizes are each held to recent trials that lie, on average, as far
+    out as draws from it do (:func:`_as_far_out`): if success does not rise with the distance from
+    the middle, draws succeed at least as often as those trials. The Clopper-Pearson bounds hold
+    for all sizes together, with the confidence shared out among them (Bonferroni), so that any
+    of them may be chosen: here the largest whose bound is within ``GIVE`` of the best.
+
+    ``None`` below two successes, and where no size has any support.
     """
-    won = int(recent.success.sum())
-    if won < 2:
+    if int(recent.success.sum()) < 2:
         return None
-    reach = math.sqrt(len(focus.scale) + 2)
+    n = len(focus.scale)
+    distance = focus.distance(recent.u) / math.sqrt(n)
+    held = [recent.success[_as_far_out(distance, reach)] for reach in REACHES]
+    confidence = 1.0 - (1.0 - CONFIDENCE) / len(REACHES)
+    lows = [clopper_pearson_low(int(won.sum()), len(won), confidence) for won in held]
+    if max(lows) == 0.0:
+        return None
+    best = max(k for k, low in enumerate(lows) if low >= GIVE * max(lows))
     return Region(
         space=space,
         centre=space.denormalise(np.clip(focus.centre, 0.0, 1.0)),
-        radius=reach * focus.scale * (space.high - space.low),
-        success_low=clopper_pearson_low(won, len(recent)),
+        # Uniform in an ellipsoid of half axes r, a draw has the standard deviations
+        # r / sqrt(n + 2) and lies sqrt(n / (n + 2)) of the way out (root mean square).
+        radius=REACHES[best] * math.sqrt(n + 2) * focus.scale * (space.high - space.low),
+        success_low=lows[best],
         confidence=CONFIDENCE,
-        trials=len(recent),
-        successes=won,
+        trials=len(held[best]),
+        successes=int(held[best].sum()),
     )
+
+
+def _as_far_out(distance: Array, reach: float) -> npt.NDArray[np.int64]:
+    """Return which trials ``(k,)`` speak for an ellipsoid that reaches so far.
+
+    Those within ``NEIGHBOURHOOD`` reaches, and of these the outermost whose root mean square
+    distance is no less than ``reach``: all, if that holds for all; none, if it holds for none.
+
+    Args:
+        distance: Root mean square over the axes of the offset in deviations ``(m,)``.
+        reach: In the same unit.
+    """
+    order = np.argsort(-distance, kind="stable")
+    inside = order[distance[order] <= NEIGHBOURHOOD * reach]
+    mean_square = np.cumsum(distance[inside] ** 2) / np.arange(1, len(inside) + 1)
+    outermost: npt.NDArray[np.int64] = inside[: int(np.sum(mean_square >= reach**2))]
+    return outermost
