@@ -16,6 +16,7 @@ from shearline.deploy.commands import (
     evaluator,
     learner,
     operate,
+    replay,
     show,
     study,
     trials,
@@ -50,6 +51,6 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in (up, learner, evaluator, operate, trials, show, bench, study, doctor):
+    for module in (up, learner, evaluator, operate, trials, show, replay, bench, study, doctor):
         module.register(commands)
     return top
