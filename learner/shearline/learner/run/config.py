@@ -30,6 +30,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     Attributes:
         task: What is being learned.
         learner: Name of the learner, e.g. ``"psp"``.
+        switches: What that learner lets one choose, by name, e.g. ``{"svm_c": 1000.0}``.
         episodes: Updates of the learner.
         trials: Trials of each episode.
         seed: Decides proposals and trial seeds.
@@ -51,6 +52,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     task: TaskSpec
     learner: Annotated[str, Meta(min_length=1, max_length=64)] = "psp"
+    switches: dict[str, Any] = {}
     episodes: Annotated[int, Meta(ge=1, le=1_000_000)] = 10
     trials: Annotated[int, Meta(ge=1, le=TRIALS_MAX)] = 20
     seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
@@ -147,6 +149,8 @@ def difference(asked: RunConfig, found: RunConfig) -> str:
         was, wanted = getattr(found, field), getattr(asked, field)
         if was != wanted:
             return f"its {field} is {was!r}, not {wanted!r}"
+    if found.switches != asked.switches:
+        return f"its learner has other switches ({', '.join(found.switches) or 'none'})"
     if digest(found.task) != digest(asked.task):
         return f"its task is {found.task.name!r} with other bounds or options, or another task"
     return ""
