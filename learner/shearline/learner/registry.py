@@ -25,6 +25,9 @@ LEARNERS: Mapping[str, str] = MappingProxyType(
     }
 )
 
+#: Not an optimiser, so not listed: it tries the tuples it is given, ``tuples=[...]``.
+UNLISTED: Mapping[str, str] = MappingProxyType({"plan": "shearline.learner.plan:Plan"})
+
 #: Other words for them: ``best`` is the learner we would use ourselves.
 ALIASES: Mapping[str, str] = MappingProxyType({"best": "psp"})
 
@@ -41,7 +44,7 @@ def resolve(name: str) -> str:
         UnknownLearnerError: If there is no such learner.
     """
     resolved = ALIASES.get(name, name)
-    if resolved not in LEARNERS:
+    if resolved not in LEARNERS and resolved not in UNLISTED:
         raise UnknownLearnerError(
             f"no learner is called {name!r}: expected one of {', '.join(names())}"
         )
@@ -73,7 +76,7 @@ def create(
         [0, 1, 2]
     """
     resolved = resolve(name)
-    module, _, attribute = LEARNERS[resolved].partition(":")
+    module, _, attribute = {**LEARNERS, **UNLISTED}[resolved].partition(":")
     make = getattr(importlib.import_module(module), attribute)
     try:
         call = inspect.signature(make).bind(space, episode_length, seed, **switches)
