@@ -1,6 +1,5 @@
 """Bad input ends in one sentence and the right exit code, before anything is started."""
 
-import json
 import os
 import socket
 import subprocess
@@ -165,19 +164,3 @@ def test_what_was_typed_reaches_the_child_unchanged() -> None:
     again = parser().parse_args(["learner", *run_arguments(first)])
     for name in ("config", "task", "learner", "episodes", "trials", "seed", "lease", "no_record"):
         assert getattr(again, name) == getattr(first, name), name
-
-
-def test_a_study_prints_a_row_per_learner_and_function(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert main(["study", "functions", "--experiments", "2", "--learners", "lhs", "--json"]) == 0
-    rows = json.loads(capsys.readouterr().out)
-    assert [row["learner"] for row in rows] == ["lhs", "lhs"]
-    assert all(row["runs"] == 2 and 50 < row["best"] < 400 for row in rows)
-
-
-@pytest.mark.usefixtures("folder")
-def test_a_study_of_an_unknown_learner_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    code, error = refused(["study", "functions", "--learners", "nobody"], capsys)
-    assert code == 2
-    assert "psp" in error

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from shearline.learner import Recommendation, Space, create
+from shearline.learner import Learner, Recommendation, Space, create
 
 Array = npt.NDArray[np.float64]
 
@@ -45,22 +45,42 @@ class Run:
         cost: Their costs ``(trials,)``.
         success: Whether they succeeded ``(trials,)``.
         episode_length: Trials per episode.
-        recommendation: Where the learner would stay.
-        learner_s: Time spent in the learner itself [s].
+        learner: As it stands at the end, everything told.
+        learner_s: Processor time spent in the learner's proposals [s].
     """
 
     theta: Array
     cost: Array
     success: npt.NDArray[np.bool_]
     episode_length: int
-    recommendation: Recommendation
+    learner: Learner
     learner_s: float
+
+    @property
+    def recommendation(self) -> Recommendation:
+        """Where the learner would stay; made when it is asked for."""
+        return self.learner.recommend()
 
     @property
     def best(self) -> float:
         """Cost of the cheapest success; infinite without one."""
         won = self.cost[self.success]
         return float(won.min()) if len(won) else float("inf")
+
+    def best_every(self, evaluations: int) -> Array:
+        """Return the cost of the cheapest success after each so many trials ``(points,)``.
+
+        Infinite before the first success; a rest of fewer trials has no point.
+        """
+        costs = np.where(self.success, self.cost, np.inf)
+        best: Array = np.minimum.accumulate(costs)[evaluations - 1 :: evaluations]
+        return best
+
+    @property
+    def mean_by_episode(self) -> Array:
+        """Mean cost of each episode's trials ``(episodes,)``, failures among them."""
+        means: Array = self.cost.reshape(-1, self.episode_length).mean(axis=1)
+        return means
 
     @property
     def success_by_episode(self) -> Array:
@@ -86,9 +106,9 @@ def run_learner(
     rng = np.random.default_rng(np.random.SeedSequence([seed, 0xBE4C]))
     theta, costs, wins, learner_s = [], [], [], 0.0
     for _ in range(episodes):
-        began = time.perf_counter()
+        began = time.thread_time()
         proposals = learner.ask(episode_length)
-        learner_s += time.perf_counter() - began
+        learner_s += time.thread_time() - began
         for proposal in proposals:
             cost, success = problem.trial(proposal.theta, rng)
             learner.tell(proposal.trial, cost=cost, success=success)
@@ -100,7 +120,7 @@ def run_learner(
         cost=np.array(costs),
         success=np.array(wins, dtype=np.bool_),
         episode_length=episode_length,
-        recommendation=learner.recommend(),
+        learner=learner,
         learner_s=learner_s,
     )
 
@@ -116,7 +136,7 @@ class Row:
         best: Mean over the runs of the cheapest success.
         best_se: Its standard error; ``nan`` for a single run.
         success_late: Share of successes in the last three episodes.
-        learner_s: Mean time of one run spent in the learner [s].
+        learner_s: Mean processor time of one run spent in the learner [s].
     """
 
     learner: str
