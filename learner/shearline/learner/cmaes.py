@@ -1,0 +1,201 @@
+"""CMA-ES, the covariance matrix adaptation evolution strategy, through the ``cma`` package.
+
+Hansen, Akimoto and Baudis's package (BSD licence) does the search; this translates: trials that
+come back late, in pieces or never into generations, failures into costs. It knows nothing of how
+the package adapts.
+"""
+
+from __future__ import annotations
+
+import enum
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shearline.learner.base import Array
+from shearline.learner.charge import Failures, charged
+from shearline.learner.episodic import EpisodicLearner
+from shearline.learner.errors import LearnerError
+from shearline.learner.ledger import Trials
+from shearline.learner.recommend import Focus
+from shearline.learner.switches import check, having, plain
+from shearline.learner.threads import fitting
+from shearline.protocol.space import Space
+
+#: Fewest solutions of a generation: below, the package would need mirrored ones.
+POPULATION_MIN = 4
+#: The package has no one-dimensional search: a second coordinate is added there, and ignored.
+DIMENSIONS_MIN = 2
+#: Least standard deviation of a focus, in units of the cube's edge.
+SCALE_MIN = 0.001
+
+
+class Population(enum.StrEnum):
+    """How many solutions make a generation."""
+
+    PACKAGE = "package"  # 4 + 3 log n; an episode holds several, drawn from one distribution
+    EPISODE = "episode"  # one generation is one episode
+
+
+class Boundary(enum.StrEnum):
+    """Which of the package's boundary handlers keeps solutions in the box."""
+
+    TRANSFORM = "transform"  # the package's default: the search space is folded at the walls
+    PENALTY = "penalty"  # solutions are put on the wall and charged for it
+
+
+@dataclass(frozen=True, slots=True)
+class CMAESConfig:
+    """What the package leaves to its user, and what our episodes add.
+
+    Attributes:
+        population: Size of a generation.
+        start: Where every parameter starts, as a share of its range: .5 is the middle of the box;
+            the paper's authors' code (MIOS) starts at .1.
+        spread: Standard deviation at the start as a share of the range; the package advises that
+            the optimum lie within three of them. MIOS takes .2.
+        boundary: The boundary handler.
+        failures: Whether failures differ among themselves. Costs only count by their rank within
+            a generation.
+    """
+
+    population: Population = Population.PACKAGE
+    start: float = 0.5
+    spread: float = 0.3
+    boundary: Boundary = Boundary.TRANSFORM
+    failures: Failures = Failures.ALIKE
+
+    def __post_init__(self) -> None:
+        check(0 <= self.start <= 1, "cmaes", "start", "0 to 1", self.start)
+        check(self.spread > 0, "cmaes", "spread", "above 0", self.spread)
+
+
+class CMAES(EpisodicLearner):
+    """The package's ask and tell behind ours.
+
+    Outcomes wait in line, by trial number, until an episode begins; then all that wait are told,
+    each once, generation by generation. Fewer than a population are one generation; fewer than
+    the package can do with wait on. So a missing trial costs its own
+    information and nothing else. A late one belongs to a distribution that has moved on: the
+    package shortens its step to a plausible length, as it does with any foreign solution.
+
+    Args:
+        space: What is being learned.
+        episode_length: Trials between two updates.
+        seed: 0 or more.
+        switches: Fields of :class:`CMAESConfig`.
+
+    Raises:
+        LearnerError: If the ``cma`` package is not installed.
+    """
+
+    name = "cmaes"
+
+    def __init__(
+        self, space: Space, episode_length: int = 20, seed: int = 0, **switches: object
+    ) -> None:
+        super().__init__(space, episode_length, seed)
+        self.config = having(CMAESConfig(), self.name, switches)
+        self._normal = np.random.default_rng()
+        self._strategy: Any = None
+        self._solutions: list[Array] = []
+        self._batch = np.empty((0, len(space)))
+        self._told: set[int] = set()
+
+    def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
+        self._normal = rng
+        with fitting(), warnings.catch_warnings():
+            # It warns of generations larger than usual, which a batch makes; the sizes are ours.
+            warnings.simplefilter("ignore")
+            if self._strategy is None:
+                self._strategy = self._make()
+            self._tell_waiting(episode, trials)
+            asked = self._strategy.ask(self.episode_length)
+        self._solutions += [np.array(x) for x in asked]
+        self._batch = np.array(asked)[:, : len(self.space)]
+
+    def _draw(self, index: int, rng: np.random.Generator) -> Array:
+        del rng
+        return np.array(self._batch[index])
+
+    def _make(self) -> Any:
+        """Return the package's strategy on the unit cube, with its numbers from our generator."""
+        try:
+            # It ships no type information.
+            import cma  # type: ignore[import-untyped]  # noqa: PLC0415 - heavy, at the first ask
+        except ImportError:
+            raise LearnerError(
+                "cmaes needs the package cma: install shearline with the extra 'learner'"
+            ) from None
+        n = max(DIMENSIONS_MIN, len(self.space))
+        handlers = {
+            Boundary.TRANSFORM: cma.BoundTransform,
+            Boundary.PENALTY: cma.BoundPenalty,
+        }
+        options = {
+            "bounds": [0.0, 1.0],
+            "BoundaryHandler": handlers[self.config.boundary],
+            "randn": lambda *shape: self._normal.standard_normal(shape),
+            "seed": np.nan,  # its word for "leave numpy's global generator alone"
+            "CMA_mirrors": 0,
+            "verbose": -9,
+        }
+        if self.config.population is Population.EPISODE:
+            options["popsize"] = max(POPULATION_MIN, self.episode_length)
+        return cma.CMAEvolutionStrategy(n * [self.config.start], self.config.spread, options)
+
+    def _tell_waiting(self, episode: int, trials: Trials) -> None:
+        """Tell the package in generations what it has not been told."""
+        cost = charged(trials, self.config.failures)
+        waiting = [i for i, k in enumerate(trials.number.tolist()) if k not in self._told]
+        if len(waiting) < max(POPULATION_MIN, int(self._strategy.sp.weights.mu)):
+            return
+        for first, beyond in generations(len(waiting), int(self._strategy.popsize)):
+            if first:
+                # The package takes one generation per ask; what this draws is dropped.
+                self._strategy.ask(1)
+            chosen = waiting[first:beyond]
+            numbers = trials.number[chosen].tolist()
+            solutions = [self._solutions[k] for k in numbers]
+            late = [i for i, k in enumerate(numbers) if k // self.episode_length < episode - 1]
+            self._strategy.tell(solutions, cost[chosen].tolist(), check_points=late)
+            self._told.update(numbers)
+
+    def _focus(self, trials: Trials) -> Focus:
+        """Return the distribution's mean and spread, once it has been told of a success."""
+        if self._strategy is None or not trials.success.any():
+            return super()._focus(trials)
+        n = len(self.space)
+        result = self._strategy.result
+        scale = np.maximum(np.asarray(result.stds, dtype=np.float64)[:n], SCALE_MIN)
+        return Focus(np.asarray(result.xfavorite, dtype=np.float64)[:n], scale)
+
+    def _model(self) -> Mapping[str, object]:
+        mixture = None if self._strategy is None else gaussian(self._strategy, len(self.space))
+        return {"config": plain(self.config), "mixture": mixture}
+
+
+def generations(count: int, population: int) -> list[tuple[int, int]]:
+    """Return where generations begin and end in a line of ``count`` outcomes.
+
+    Each has the population's size; the last takes in what is left over. (Even sizes did worse, a
+    larger first one worse still: 13.4 and 14.4 against 11.3 on the shifted 20-D sphere.)
+    """
+    starts = [k * population for k in range(max(1, count // population))]
+    return list(zip(starts, [*starts[1:], count], strict=True))
+
+
+def gaussian(strategy: Any, n: int) -> dict[str, object]:
+    """Return a strategy's distribution as a mixture of one component, as plain values."""
+    result = strategy.result
+    shape = np.asarray(strategy.sm.covariance_matrix)[:n, :n]
+    # The package keeps shape and size apart; the standard deviations have both.
+    scale = np.asarray(result.stds)[:n] / np.sqrt(np.diag(shape))
+    return {
+        "weights": [1.0],
+        "means": [np.asarray(result.xfavorite)[:n].tolist()],
+        "covariances": [(shape * np.outer(scale, scale)).tolist()],
+    }
