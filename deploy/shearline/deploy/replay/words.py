@@ -62,9 +62,8 @@ def lines(replayed: Replayed, change: Change, verified: Verification | None) -> 
 def sentence(verified: Verification) -> str:
     """Say in one sentence whether a trial came out again."""
     if verified.identical:
-        return (
-            f"trial {verified.trial} came out identical to the last bit, {verified.digest_replayed}"
-        )
+        though = f", though {verified.why}" if verified.why else ""
+        return f"trial {verified.trial} came out identical to the last bit{though}"
     return f"trial {verified.trial} did not come out again: {verified.why}"
 
 

@@ -26,7 +26,8 @@ class Verification:
         identical: To the last bit.
         digest_recorded: Of the trace, or of the outcome where the task has no trace.
         digest_replayed: Of the same when run again; ``""`` if it had no verdict.
-        why: What differs and what may be the reason, one sentence; ``""`` if identical.
+        why: What differs and what may be the reason, in one sentence. If identical ``""``, or that
+            it is so on another engine or task than the recorded one.
     """
 
     trial: int
@@ -70,12 +71,14 @@ def judge(replayed: Replayed, spec: TaskSpec) -> Verification:
     case = replayed.case
     assert case.outcome is not None
     differs = case.contradiction() or _difference(replayed, case.outcome)
+    other = _other(replayed, case.outcome, spec)
+    reason = other or _same_but_different(replayed)
     return Verification(
         trial=case.trial,
         identical=not differs,
         digest_recorded=case.digest,
         digest_replayed=replayed.digest,
-        why=f"{differs}; {_reason(replayed, case.outcome, spec)}" if differs else "",
+        why=f"{differs}; {reason}" if differs else other,
     )
 
 
@@ -124,14 +127,18 @@ def _outcomes(replayed: Replayed, recorded: Counted) -> str:
     return ""
 
 
-def _reason(replayed: Replayed, recorded: Counted, spec: TaskSpec) -> str:
-    """Say what may be behind a difference."""
-    case = replayed.case
-    if digest(spec) != digest(case.task):
-        return f"the task is not the same: {_other_task(case.task, spec)}"
+def _other(replayed: Replayed, recorded: Counted, spec: TaskSpec) -> str:
+    """Say in what the task or the engine here is another than the recorded one, or ``""``."""
+    if digest(spec) != digest(replayed.case.task):
+        return f"the task is not the same: {_other_task(replayed.case.task, spec)}"
     if recorded.engine != replayed.engine:
         return f"the engine is not the same: {recorded.engine} on record, {replayed.engine} here"
-    if case.contradiction():
+    return ""
+
+
+def _same_but_different(replayed: Replayed) -> str:
+    """Say what may be behind a difference where task and engine are the same."""
+    if replayed.case.contradiction():
         return "the record was changed after the run"
     return (
         f"the engine is the same ({replayed.engine}), so the record was changed, or this processor"

@@ -71,33 +71,43 @@ def write(path: Path, frames: Iterable[Image], width: int, height: int) -> int:
         ConfigError: If there is no ffmpeg.
         VideoError: If ffmpeg fails.
     """
+    # A film that was not finished must not stand where a whole one is expected.
+    part = path.with_name(f".{path.name}.part.mp4")
+    try:
+        count = _encode([encoder(), *_arguments(part, width, height)], frames)
+        part.replace(path)
+    except (_EncoderError, OSError) as error:
+        raise VideoError(f"{path} could not be written: {error}") from None
+    finally:
+        part.unlink(missing_ok=True)
+    return count
+
+
+class _EncoderError(Exception):
+    """What ffmpeg said last."""
+
+
+def _encode(command: list[str], frames: Iterable[Image]) -> int:
     count = 0
     with tempfile.TemporaryFile() as words:
         process = subprocess.Popen(  # noqa: S603 - the encoder we depend on, our own arguments
-            [encoder(), *_arguments(path, width, height)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=words,
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=words
         )
-        assert process.stdin is not None
-        try:
-            for frame in frames:
-                process.stdin.write(np.ascontiguousarray(frame).data)
-                count += 1
-            process.stdin.close()
-        except BrokenPipeError:
-            pass  # its exit code says why
-        except BaseException:
-            process.kill()
-            raise
-        finally:
-            process.wait()
-        if process.returncode != 0:
-            words.seek(0)
-            said = words.read().decode(errors="replace").strip().splitlines()
-            raise VideoError(
-                f"{path} could not be written: {said[-1] if said else 'ffmpeg failed'}"
-            )
+        with process:  # closes the pipe and waits
+            assert process.stdin is not None
+            try:
+                for frame in frames:
+                    process.stdin.write(np.ascontiguousarray(frame).data)
+                    count += 1
+            except BrokenPipeError:
+                pass  # its last words say why
+            except BaseException:
+                process.kill()
+                raise
+        words.seek(0)
+        said = words.read().decode(errors="replace").strip().splitlines()
+    if process.returncode != 0:
+        raise _EncoderError(said[-1] if said else "ffmpeg failed without a word")
     return count
 
 
