@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 from unittest import mock
 
-from shearline.learner.dispatcher import core, desk, handout, results
+from shearline.learner.dispatcher import book, core, desk, handout, results
 from shearline.learner.dispatcher.entries import (
     AttemptIssued,
     Entry,
@@ -22,7 +22,7 @@ from shearline.learner.dispatcher.entries import (
 )
 from shearline.learner.dispatcher.events import ResultReceived
 from shearline.learner.dispatcher.states import AttemptState, RunState, TrialState
-from shearline.protocol.messages import Verdict
+from shearline.protocol.messages import Purpose, Verdict
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,8 @@ def _yes(*_: object, **__: object) -> bool:
 _true_room: Callable[[Any, Any], int] = handout._room
 _true_revivable: Callable[[Any, Any], bool] = results._is_revivable
 
+_true_open: Callable[[Any, Any, Purpose], None] = book.Book._open
+
 _true_result: Callable[[Any, Any], Verdict] = results.result
 
 
@@ -91,6 +93,10 @@ def _copy_to_anyone(desk: Any, attempt: Any, idle: list[Any]) -> None:
     for evaluator in idle:
         desk.issue(desk.book.trials[attempt.trial], evaluator, copy=True)
     idle.clear()
+
+
+def _learn_from_everything(its: Any, entry: Any, _purpose: Purpose) -> None:
+    _true_open(its, entry, Purpose.LEARNING)
 
 
 def _believe_any_sender(desk: Any, event: Any) -> Verdict:
@@ -117,5 +123,6 @@ PLANTS: Mapping[str, Plant] = {
     "handing out after stop": Plant({(handout, "_room"): _room_after_stop}),
     "reviving what was given out again": Plant({(results, "_is_revivable"): _revive_anything}),
     "the clock believed": Plant({(desk.Desk, "look"): _believe_the_clock}),
+    "learning from confirmations": Plant({(book.Book, "_open"): _learn_from_everything}),
     "copies for anyone": Plant({(handout, "_copy"): _copy_to_anyone}),
 }

@@ -20,7 +20,7 @@ from shearline.learner.dispatcher.entries import (
     TrialsProposed,
 )
 from shearline.learner.dispatcher.events import Planned
-from shearline.learner.dispatcher.instructions import Ending, EndRun, Told
+from shearline.learner.dispatcher.instructions import Ask, Ending, EndRun, Instruction, Told
 from shearline.protocol.messages import Ack, Verdict
 
 
@@ -28,11 +28,11 @@ class BrokenError(AssertionError):
     """A promise does not hold."""
 
 
-def propose(episode: int, trials: int, told: list[Told]) -> list[Planned]:
+def propose(episode: int, trials: int, told: list[Told], first: int) -> list[Planned]:
     """Stand in for a learner: proposals depend on everything told before, and on nothing else."""
     memory = hashlib.sha256(repr((episode, told)).encode()).digest()
     return [
-        Planned(episode * trials + i, [int.from_bytes(memory[:4], "big") / 2**32 + i], 1000 + i)
+        Planned(first + i, [int.from_bytes(memory[:4], "big") / 2**32 + i], 1000 + i)
         for i in range(trials)
     ]
 
@@ -112,7 +112,8 @@ class Promises:
         self._in_order()
         patient = self.rules.losses_max == self.rules.aborts_max == 100
         if finished.ending is Ending.COMPLETE:
-            asked = self.rules.episodes * self.rules.trials
+            confirming = sum(trials for _, trials in self.rules.confirming())
+            asked = self.rules.episodes * self.rules.trials + confirming
             if book.tally.counted + book.tally.lost != asked or book.unsettled:
                 raise BrokenError(f"{book.tally} is not every one of {asked} trials")
             if self.rules.quorum == 1.0 and patient:
@@ -151,13 +152,26 @@ class Promises:
     def _as_undisturbed(self, book: Book) -> None:
         """A run in which nothing was lost proposed what an undisturbed one would have."""
         told: list[Told] = []
-        for episode in range(self.rules.episodes):
-            for planned in propose(episode, self.rules.trials, told):
+        first = episode = 0
+        while (agenda := self.rules.agenda(episode)) is not None:
+            _, trials = agenda
+            for planned in propose(episode, trials, told, first):
                 if book.trials[planned.trial].theta != planned.theta:
                     raise BrokenError(
                         f"trial {planned.trial} is not what an undisturbed run proposes"
                     )
-            told += book.told[episode]
+            if episode < self.rules.episodes:
+                told += book.told[episode]
+            first, episode = first + trials, episode + 1
+
+
+def learn_from_no_confirmation(out: Iterable[Instruction], proposed: int) -> None:
+    """The learner hears of no trial but the ``proposed`` first, which are its own."""
+    for instruction in out:
+        if isinstance(instruction, Ask | EndRun) and any(
+            tell.trial >= proposed for tell in instruction.tells
+        ):
+            raise BrokenError("the learner was told of a confirmation")
 
 
 def durable(book: Book) -> dict[str, object]:

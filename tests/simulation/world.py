@@ -13,7 +13,7 @@ from simulation.adversary import Adversary, revive
 from simulation.evaluators import LEASE_S, SimEvaluator
 from simulation.network import Clock, Network
 from simulation.plants import NONE, Plant
-from simulation.promises import BrokenError, Promises, propose
+from simulation.promises import BrokenError, Promises, learn_from_no_confirmation, propose
 
 from shearline.learner.dispatcher import Book, Dispatcher, Rules
 from shearline.learner.dispatcher.checks import check, check_desk
@@ -57,7 +57,7 @@ class World:
         self.plant = plant
         self.clock = Clock()
         self.network = Network(self.clock, self.rng)
-        self.rules = self._rules()
+        self.rules = self._rules(seed)
         self.promises = Promises(self.rules)
         self.finished: EndRun | None = None
         self.up = self.frozen = self.stopped = False
@@ -73,7 +73,9 @@ class World:
         for evaluator in self.evaluators.values():
             evaluator.learner = self
 
-    def _rules(self) -> Rules:
+    def _rules(self, seed: int) -> Rules:
+        # From a generator of its own: what a seed meant before there were confirmations, it means.
+        confirm = random.Random(f"confirm {seed}")
         return Rules(
             task=TASK,
             episodes=self.rng.choice((1, 2, 3)),
@@ -84,6 +86,8 @@ class World:
             quorum_after_s=5.0,
             losses_max=self.rng.choice((3, 100)),
             aborts_max=self.rng.choice((3, 100)),
+            confirm=confirm.choice((0, 0, 3)),
+            confirm_region=confirm.choice((0, 0, 0, 2)),
         )
 
     def run(self) -> None:
@@ -162,6 +166,7 @@ class World:
             self._note_renewal(event)
         if self.plant.ack_first:
             out.sort(key=lambda instruction: isinstance(instruction, Journal))
+        learn_from_no_confirmation(out, self.rules.episodes * self.rules.trials)
         for instruction in out:
             self.crash_in -= 1
             if self.crash_in == 0:
@@ -203,8 +208,8 @@ class World:
             case Broadcast(message):
                 for name in self.evaluators:
                     self._deliver(name, message)
-            case Ask(episode, trials, _):
-                self._ask(episode, trials)
+            case Ask():
+                self._ask(instruction)
             case EndRun():
                 self._ended(instruction)
 
@@ -212,9 +217,11 @@ class World:
         evaluator = self.evaluators[name]
         self.network.carry(name, lambda: evaluator.receive(message), up=False)
 
-    def _ask(self, episode: int, trials: int) -> None:
-        told = [tell for batch in self.dispatcher.book.told for tell in batch]
-        answer = ProposalsReady(episode, propose(episode, trials, told))
+    def _ask(self, ask: Ask) -> None:
+        # What is to be confirmed is what was recommended when the last episode had closed.
+        batches = self.dispatcher.book.told[: self.rules.episodes]
+        told = [tell for batch in batches for tell in batch]
+        answer = ProposalsReady(ask.episode, propose(ask.episode, ask.trials, told, ask.first))
         life = self.life
         delay_s = self.rng.choice((0.0, 0.01, 1.0))
         self.clock.after(delay_s, lambda: self.hear(answer) if life == self.life else None)

@@ -43,7 +43,16 @@ LEARNERS = ("lhs", pytest.param("psp", marks=pytest.mark.slow))
 
 def config_of(learner: str) -> RunConfig:
     """Return a run long enough for the learner to have learned something."""
-    return RunConfig(task=TASK, learner=learner, episodes=4, trials=6, seed=3, record=False)
+    return RunConfig(
+        task=TASK,
+        learner=learner,
+        episodes=4,
+        trials=6,
+        seed=3,
+        record=False,
+        confirm=3,
+        confirm_region=3,
+    )
 
 
 class Course(NamedTuple):
@@ -52,6 +61,7 @@ class Course(NamedTuple):
     proposed: dict[int, tuple[list[float], int]]
     told: list[tuple[Told, ...]]
     recommended: list[float]
+    radius: list[float]
 
 
 class Leading:
@@ -94,11 +104,13 @@ class Leading:
         while not isinstance(last := self.inbox.get(timeout=60), Recommended):
             pass
         assert last.recommendation is not None
+        region = last.recommendation.region
         book = self.dispatcher.book
         return Course(
             {n: (row.theta, row.seed) for n, row in book.trials.items()},
             book.told,
             last.recommendation.theta.tolist(),
+            [] if region is None else region.radius.tolist(),
         )
 
     def _do(self, event: Event) -> None:

@@ -56,6 +56,7 @@ def propose(desk: Desk, event: ProposalsReady) -> None:
     desk.asking = None
     desk.journal(_opened(desk, event))
     desk.opened_s = desk.clock_s
+    settle(desk)  # nothing to confirm is confirmed at once
 
 
 def _opened(desk: Desk, event: ProposalsReady) -> TrialsProposed:
