@@ -17,6 +17,7 @@ from shearline.deploy.commands import (
     learner,
     operate,
     replay,
+    report,
     show,
     study,
     trials,
@@ -51,6 +52,18 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in (up, learner, evaluator, operate, trials, show, replay, bench, study, doctor):
+    for module in (
+        up,
+        learner,
+        evaluator,
+        operate,
+        trials,
+        report,
+        show,
+        replay,
+        bench,
+        study,
+        doctor,
+    ):
         module.register(commands)
     return top

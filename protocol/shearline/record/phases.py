@@ -38,9 +38,12 @@ def phases_of(trace: TraceData) -> tuple[Phase, ...]:
     columns = np.frombuffer(trace.data, dtype="<f4").reshape(len(trace.names), trace.samples)
     clock = columns[0]
     column = columns[trace.names.index("phase")] if "phase" in trace.names else None
-    starts = [
-        (at_s, name) for at_s, name in trace.events if column is None or _new(column, clock, at_s)
-    ]
+    starts: list[tuple[float, str]] = []
+    for at_s, name in trace.events:
+        # of two events at one time, the first begins the phase and the second is its landmark
+        again = bool(starts) and at_s <= starts[-1][0] + SAME_S
+        if column is None or (not again and _new(column, clock, at_s)):
+            starts.append((at_s, name))
     ends = [at_s for at_s, _ in starts[1:]] + [float(clock[-1])]
     return tuple(
         Phase(name, at_s, end_s)

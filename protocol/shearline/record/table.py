@@ -27,9 +27,9 @@ class Table(Mapping[str, Column]):
 
     A mapping of column names to arrays ``(trials,)``, so that ``pandas.DataFrame(dict(table))``
     is a data frame. Columns are ``trial, episode, outcome, success, cost, evaluator, attempts,
-    seed, engine, digest, wall_s, late, why, at_s``, then ``theta.NAME`` for each parameter and
-    ``extras.NAME`` for each further number. What a trial does not have is ``nan``: the cost of a
-    lost one, an extra that only others said.
+    seed, engine, digest, wall_s, late, why, at_s, purpose``, then ``theta.NAME`` for each
+    parameter and ``extras.NAME`` for each further number. What a trial does not have is ``nan``:
+    the cost of a lost one, an extra that only others said.
 
     Attributes:
         columns: Name to values.
@@ -96,6 +96,7 @@ def _facts(outcomes: Sequence[Counted]) -> dict[str, Column]:
         "late": _column(outcomes, "late", np.bool_),
         "why": _column(outcomes, "why", np.str_),
         "at_s": _column(outcomes, "at_s", np.float64),
+        "purpose": np.array([outcome.purpose.value for outcome in outcomes], dtype=np.str_),
     }
 
 
