@@ -98,7 +98,8 @@ def _strategy(info: Any) -> st.SearchStrategy[Any]:  # noqa: C901, PLR0911 - one
         case inspect.EnumType(cls=cls):
             return st.sampled_from(cls)
         case inspect.ListType(item_type=item):
-            return st.lists(_strategy(item), min_size=info.min_length or 0, max_size=4)
+            most = min(4, info.max_length or 4)
+            return st.lists(_strategy(item), min_size=info.min_length or 0, max_size=most)
         case inspect.DictType(key_type=key, value_type=value):
             return st.dictionaries(
                 _strategy(key), _strategy(value), min_size=info.min_length or 0, max_size=4
@@ -159,7 +160,7 @@ def test_every_message_type_is_in_one_of_the_directions() -> None:
     ours = {
         kind
         for kind in Message.__subclasses__()
-        if kind.__module__ == "shearline.protocol.messages"
+        if kind.__module__ in {"shearline.protocol.messages", "shearline.protocol.scene"}
     }
     assert {*KINDS, *FROM_OPERATOR} == ours
 

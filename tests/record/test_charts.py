@@ -12,6 +12,7 @@ from shearline.record.charts import (
     WIDTH,
     bounds,
     chart,
+    marks,
     nice_above,
     telling,
 )
@@ -60,7 +61,7 @@ def test_a_chart_fills_its_frame() -> None:
     assert line[0].tolist() == pytest.approx([0.0, HEIGHT])
     assert line[-1].tolist() == pytest.approx([WIDTH, 0.0])
     assert drawn.events[0][0].tolist() == pytest.approx([WIDTH / 2.0, 0.0])
-    assert len(drawn.marks) == len(drawn.labels) == 2 * GRID_LINES + 1
+    assert len(marks()) == len(drawn.labels) == 2 * GRID_LINES + 1
     assert drawn.labels[0] == "0"
     assert drawn.labels[-1] == "2 s"
 

@@ -36,8 +36,8 @@ def a_number(kind: inspect.FloatType, r: Random) -> float:
     return value if kind.ge is not None else r.choice((value, -value))
 
 
-def some(kind: inspect.Type, r: Random, least: int) -> list[Any]:
-    return [a_value(kind, r) for _ in range(r.randint(least, least + 3))]
+def some(kind: inspect.Type, r: Random, least: int, most: int = 1024) -> list[Any]:
+    return [a_value(kind, r) for _ in range(r.randint(least, min(least + 3, most)))]
 
 
 #: How to make a value that a field admits, by the kind of its type.
@@ -50,7 +50,9 @@ MAKERS: dict[type[inspect.Type], Callable[[Any, Random], Any]] = {
     inspect.BytesType: lambda _, r: b"".join(struct.pack("<f", r.random()) for _ in range(5)),
     inspect.BoolType: lambda _, r: r.random() < 0.5,
     inspect.EnumType: lambda kind, r: r.choice(list(kind.cls)),
-    inspect.ListType: lambda kind, r: some(kind.item_type, r, kind.min_length or 0),
+    inspect.ListType: lambda kind, r: some(
+        kind.item_type, r, kind.min_length or 0, kind.max_length or 1024
+    ),
     inspect.TupleType: lambda kind, r: tuple(a_value(item, r) for item in kind.item_types),
     inspect.DictType: lambda kind, r: dict(
         zip(some(kind.key_type, r, 0), some(kind.value_type, r, 4), strict=False)

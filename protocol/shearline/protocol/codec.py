@@ -40,6 +40,7 @@ from shearline.protocol.messages import (
 )
 
 M = TypeVar("M", bound=Message)
+from shearline.protocol.scene import SceneData
 
 #: A trial of 1024 parameters takes 9 KiB, a welcome with 1024 named bounds about 40 KiB.
 CONTROL_BYTES_MAX = 64 * 1024
@@ -48,7 +49,7 @@ CONTROL_BYTES_MAX = 64 * 1024
 BULK_BYTES_MAX = 8 * 1024 * 1024
 
 #: Kinds that may be larger than a control message; all of them travel on observer keys only.
-BULK: frozenset[type[Message]] = frozenset({Snapshot, Status, TraceData, Wire})
+BULK: frozenset[type[Message]] = frozenset({SceneData, Snapshot, Status, TraceData, Wire})
 
 #: What a learner reads from evaluators, what an evaluator reads from the learner, and so on.
 TO_LEARNER: tuple[type[Message], ...] = (Hello, Credit, Renew, Result, Bye)
@@ -63,6 +64,7 @@ TO_OBSERVER: tuple[type[Message], ...] = (
     Status,
     TraceData,
     Wire,
+    SceneData,
 )
 
 #: What may come on each topic of :mod:`shearline.protocol.keys`.

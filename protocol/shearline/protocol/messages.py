@@ -14,6 +14,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from shearline.protocol.pose import Placed
+
 #: Spoken by both sides; a hello with another number is refused.
 VERSION = 1
 
@@ -367,6 +369,7 @@ class TraceData(Message, frozen=True, kw_only=True, tag="trace"):
     units: Annotated[list[str], Meta(max_length=256)]
     data: bytes
     events: Annotated[list[tuple[float, str]], Meta(max_length=256)] = []
+        placed: Bodies whose place is this trial's own.
 
     def __post_init__(self) -> None:
         """Refuse columns that do not fit together (msgspec turns this into its own error)."""
@@ -376,6 +379,7 @@ class TraceData(Message, frozen=True, kw_only=True, tag="trace"):
                 f"expected a unit for each of {len(self.names)} names and {size} bytes,"
                 f" got {len(self.units)} units and {len(self.data)} bytes"
             )
+    placed: Annotated[list[Placed], Meta(max_length=256)] = []
 
 
 class Wire(Message, frozen=True, kw_only=True, tag="wire"):

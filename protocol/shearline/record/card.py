@@ -47,4 +47,4 @@ def _parameters(counted: Counted, config: RunConfig | None) -> list[str]:
 def _bar(share: float, cells: int = 12) -> str:
     """Return a bar of fixed width with one mark at ``share`` of it, 0 to 1."""
     at = min(cells - 1, max(0, int(share * cells)))
-    return "`" + "".join("#" if i == at else "-" for i in range(cells)) + "`"
+    return f"`{'-' * at}#{'-' * (cells - 1 - at)}`"

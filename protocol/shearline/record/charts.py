@@ -20,6 +20,7 @@ Array = npt.NDArray[np.float64]
 WIDTH = 240.0
 HEIGHT = 100.0
 GRID_LINES = 4
+FRACTIONS = tuple(i / GRID_LINES for i in range(GRID_LINES + 1))
 #: Below this, values are nothing to anyone, and powers of ten lose their digits.
 TINY = 1e-300
 #: More points than pixels in a row of any screen show nothing more.
@@ -28,20 +29,16 @@ POINTS_MAX = 400
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """What to draw.
+    """What differs from trial to trial.
 
     Attributes:
-        lines: One polyline ``(points, 2)`` per series.
-        grid: Polylines of the frame and the grid.
-        events: One upright line per event.
-        marks: Where labels stand ``(labels, 2)``.
-        labels: Their texts.
+        lines: One polyline per series ``(series, points, 2)``.
+        events: One upright line per event ``(events, 2, 2)``.
+        labels: Texts of the marks.
     """
 
-    lines: list[Array]
-    grid: list[Array]
-    events: list[Array]
-    marks: Array
+    lines: Array
+    events: Array
     labels: list[str]
 
 
@@ -68,23 +65,32 @@ def chart(
     clock = np.asarray(t_s, dtype=np.float64)
     end_s = nice_above(float(clock[-1])) if clock.size and clock[-1] > 0 else 1.0
     kept = telling(series, POINTS_MAX)
-    x = clock[kept] / end_s * WIDTH
-    lines = [
-        np.stack([x, _down(values[kept].astype(np.float64), low, high)], axis=1)
-        for values in series
-    ]
-    fractions = np.linspace(0.0, 1.0, GRID_LINES + 1)
-    marks_y = np.stack([np.full_like(fractions, -9.0), HEIGHT * (1.0 - fractions) - 4.0], axis=1)
-    marks_x = np.stack([WIDTH * fractions[1:], np.full(GRID_LINES, HEIGHT + 3.0)], axis=1)
-    labels_y = [_text(low + f * (high - low)) for f in fractions]
-    labels_x = [f"{_text(f * end_s)} s" for f in fractions[1:]]
-    return Chart(
-        lines=lines,
-        grid=_grid(fractions),
-        events=[_upright(at_s / end_s * WIDTH) for at_s, _ in events],
-        marks=np.concatenate([marks_y, marks_x]),
-        labels=labels_y + labels_x,
-    )
+    lines = np.empty((len(series), len(kept), 2))
+    lines[..., 0] = clock[kept] * (WIDTH / end_s)
+    for line, curve in zip(lines, series, strict=True):
+        line[:, 1] = curve[kept]
+    lines[..., 1] = _down(lines[..., 1], low, high)
+    uprights = np.zeros((len(events), 2, 2))
+    uprights[:, :, 0] = np.array([[at_s] for at_s, _ in events]).reshape(-1, 1) * (WIDTH / end_s)
+    uprights[:, 1, 1] = HEIGHT
+    labels = [_text(low + f * (high - low)) for f in FRACTIONS]
+    labels += [f"{_text(f * end_s)} s" for f in FRACTIONS[1:]]
+    return Chart(lines, uprights, labels)
+
+
+def grid() -> list[Array]:
+    """Return the polylines of the frame and the grid, the same for every chart."""
+    frame = np.array([[0.0, 0.0], [0.0, HEIGHT], [WIDTH, HEIGHT]])
+    rows = [np.array([[0.0, HEIGHT * f], [WIDTH, HEIGHT * f]]) for f in FRACTIONS[:-1]]
+    columns = [np.array([[WIDTH * f, 0.0], [WIDTH * f, HEIGHT]]) for f in FRACTIONS[1:]]
+    return [frame, *rows, *columns]
+
+
+def marks() -> Array:
+    """Return where the labels stand ``(labels, 2)``, the same for every chart."""
+    up = [[-9.0, HEIGHT * (1.0 - f) - 4.0] for f in FRACTIONS]
+    along = [[WIDTH * f, HEIGHT + 3.0] for f in FRACTIONS[1:]]
+    return np.array(up + along)
 
 
 def telling(series: Sequence[npt.NDArray[np.float32]], n: int) -> npt.NDArray[np.intp]:
@@ -97,20 +103,20 @@ def telling(series: Sequence[npt.NDArray[np.float32]], n: int) -> npt.NDArray[np
         series: Curves ``(samples,)`` that are thinned together.
         n: At least 2.
     """
-    values = np.nan_to_num(np.stack(series)).astype(np.float64)
-    samples = values.shape[1]
+    samples = len(series[0])
     if samples <= n:
         return np.arange(samples)
+    values = np.stack(series)
+    np.nan_to_num(values, copy=False)
     spread = np.ptp(values, axis=1, keepdims=True)
-    values /= np.where(spread > 0.0, spread, 1.0)
+    scaled = values / np.where(spread > 0.0, spread, np.float32(1.0))
     width = -(-(samples - 1) // (n - 1))
     n_bins = -(-(samples - 1) // width)
-    padding = n_bins * width - (samples - 1)
-    padded = np.pad(values[:, :-1], ((0, 0), (0, padding)), constant_values=np.nan)
+    # the last bin is filled up with its own last value, which is never the first to be furthest
+    padded = np.pad(scaled[:, :-1], ((0, 0), (0, n_bins * width - (samples - 1))), mode="edge")
     bins = padded.reshape(len(values), n_bins, width)
-    away = np.abs(bins - np.nanmean(bins, axis=2, keepdims=True))
-    far = np.nan_to_num(away, nan=-1.0).max(axis=0).argmax(axis=1)
-    return np.append(np.arange(n_bins) * width + far, samples - 1)
+    away = np.abs(bins - bins.mean(axis=2, keepdims=True)).max(axis=0)
+    return np.append(np.arange(n_bins) * width + away.argmax(axis=1), samples - 1)
 
 
 def nice_above(value: float) -> float:
@@ -136,20 +142,9 @@ def bounds(low: float, high: float) -> tuple[float, float]:
 
 
 def _down(values: Array, low: float, high: float) -> Array:
-    share = (np.nan_to_num(values, nan=low) - low) / (high - low)
-    flipped: Array = HEIGHT * (1.0 - np.clip(share, -0.02, 1.02))
+    share = np.clip((values - low) / (high - low), -0.02, 1.02)
+    flipped: Array = HEIGHT * (1.0 - np.where(np.isnan(share), 0.0, share))
     return flipped
-
-
-def _grid(fractions: Array) -> list[Array]:
-    frame = np.array([[0.0, 0.0], [0.0, HEIGHT], [WIDTH, HEIGHT]])
-    rows = [np.array([[0.0, HEIGHT * f], [WIDTH, HEIGHT * f]]) for f in fractions[:-1]]
-    columns = [np.array([[WIDTH * f, 0.0], [WIDTH * f, HEIGHT]]) for f in fractions[1:]]
-    return [frame, *rows, *columns]
-
-
-def _upright(x: float) -> Array:
-    return np.array([[x, 0.0], [x, HEIGHT]])
 
 
 def _text(value: float) -> str:

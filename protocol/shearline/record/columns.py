@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shearline.record import charts
 from shearline.record.reader import Array, Trace
 
 #: Groups that people tune by, in the order in which charts are given to them.
 FIRST = ("depth", "push_wiggle", "tau_ext", "wrench", "force", "speed")
+#: Heads whose peaks matter when a trace is thinned.
+LOOKED_AT = frozenset({"depth", "push", "wiggle", "tau_ext", "wrench", "force", "speed", "tip"})
 #: Shown in space or as a state, not as curves.
 NOT_CURVES = frozenset({"tip", "phase"})
 #: Groups that are read together, by head and unit.
@@ -81,6 +84,33 @@ def limits_of(settings: Mapping[str, Any]) -> Limits:
     if not isinstance(big, float) or not isinstance(small, float):
         return {}
     return {"tau_ext": [big] * 4 + [small] * 3}
+
+
+def plain(trace: Trace) -> dict[str, Array]:
+    """Return the columns without their units."""
+    return {name: values for name, (_, values) in trace.columns.items()}
+
+
+def thinned(trace: Trace, n: int) -> Trace:
+    """Return ``n`` samples of a trace that keep the peaks of what is looked at, and the end.
+
+    A shorter trace is filled up with its last sample, so that all thinned ones are of one length.
+    """
+    looked_at = [
+        values for name, (_, values) in trace.columns.items() if name.split(".", 1)[0] in LOOKED_AT
+    ]
+    kept = charts.telling(looked_at or [trace.t_s], n)
+    kept = np.pad(kept, (0, n - len(kept)), mode="edge")
+    values = np.stack([trace.t_s, *plain(trace).values()])[:, kept]
+    named = zip(trace.columns.items(), values[1:], strict=True)
+    return Trace(
+        trial=trace.trial,
+        token=trace.token,
+        t_s=values[0],
+        columns={name: (unit, thin) for (name, (unit, _)), thin in named},
+        events=trace.events,
+        placed=trace.placed,
+    )
 
 
 def tip(trace: Trace) -> npt.NDArray[np.float32] | None:

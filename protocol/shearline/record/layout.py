@@ -1,56 +1,71 @@
 """The layout made for tuning: what stands where in the viewer, for any task.
 
-Tab one shows the run over trials beside the trial under the cursor; tab two every parameter in
-its unit; tab three the signals, played one trial after another. Only entity paths of
-:mod:`shearline.record.picture` are known here.
+One tab shows the run over trials beside the trial under the cursor, others every parameter in its
+unit, slices of the partition, and the signals played one trial after another; trials that were
+asked for have a page of their own in front. Only entity paths are known here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import PurePosixPath
 
 import numpy as np
 import numpy.typing as npt
 import rerun.blueprint as rrb
 
-from shearline.record import charts
-from shearline.record.picture import CHARTS, PLAYED
+from shearline.record import charts, page
+from shearline.record.panels import CHARTS
+from shearline.record.partition import SIDE
+from shearline.record.played import PLAYED
 from shearline.record.topics import RunConfig
 
 
-def layout(
-    config: RunConfig | None,
-    groups: Sequence[str],
-    *,
-    tip: npt.NDArray[np.float32] | None,
-    in_lock: bool = False,
-    active_tab: int = 0,
-) -> rrb.Blueprint:
-    """Return the layout.
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What a run has to show, as far as the layout depends on it.
 
-    Args:
+    Attributes:
         config: Names and units of the parameters, if known.
         groups: Names of the groups of columns that traces have, first ones first.
-        tip: A typical path of the tip ``(samples, 3)`` [m], to look at; ``None`` if there is none.
+        tip: A typical path of the tip ``(samples, 3)`` [m]; ``None`` if there is none.
         in_lock: Whether the tip is given in the lock's frame, z pointing into it.
-        active_tab: Which tab stands in front.
+        tip_frame: Entity in whose frame the tip is, below the root of a scene; ``""``: the root.
+        has_scene: Whether bodies are known.
+        slices: How many slices of the partition there are.
+        trials: Numbers of the trials that have a page of their own.
     """
-    eye = _eye(tip, down_z=in_lock) if tip is not None and len(tip) else None
-    tabs = rrb.Tabs(
-        _trials(eye, has_traces=bool(groups)),
-        _parameters(config),
-        _played(groups, eye),
+
+    config: RunConfig | None = None
+    groups: Sequence[str] = ()
+    tip: npt.NDArray[np.float32] | None = None
+    in_lock: bool = False
+    tip_frame: str = ""
+    has_scene: bool = False
+    slices: int = 0
+    trials: Sequence[int] = ()
+
+
+def layout(shape: Shape, *, active_tab: int = 0) -> rrb.Blueprint:
+    """Return the layout; pages of single trials stand first, tab ``active_tab`` in front."""
+    tabs = [
+        *([_pages(shape)] if shape.trials else []),
+        _trials(shape),
+        _parameters(shape.config),
+        *([_partition(shape)] if shape.slices else []),
+        _played(shape),
         _evaluators(),
-        active_tab=active_tab,
-    )
+    ]
+    timeline = page.CLOCK if shape.trials and active_tab == 0 else "trial"
     return rrb.Blueprint(
-        tabs,
-        rrb.TimePanel(timeline="trial", state="collapsed", play_state="paused"),
+        rrb.Tabs(*tabs, active_tab=active_tab),
+        rrb.TimePanel(timeline=timeline, state="collapsed", play_state="paused"),
         collapse_panels=True,
     )
 
 
-def _trials(eye: rrb.EyeControls3D | None, *, has_traces: bool) -> rrb.Container:
+def _trials(shape: Shape) -> rrb.Container:
     run = rrb.Vertical(
         rrb.TimeSeriesView(
             origin="/success_rate",
@@ -66,8 +81,10 @@ def _trials(eye: rrb.EyeControls3D | None, *, has_traces: bool) -> rrb.Container
         rrb.TextDocumentView(origin="/card", name="trial under the cursor"),
         row_shares=[2, 3, 4],
     )
-    trial = [_space("path of the tip, force along it", eye)] if eye else []
-    if has_traces:
+    trial: list[rrb.View | rrb.Container] = []
+    if shape.tip is not None:
+        trial.append(_tip("scene", "path of the tip, force along it", shape))
+    if shape.groups:
         trial.append(rrb.Grid(*(_chart(slot) for slot in range(CHARTS)), grid_columns=2))
     if not trial:
         return rrb.Vertical(run, name="Trials")
@@ -75,8 +92,68 @@ def _trials(eye: rrb.EyeControls3D | None, *, has_traces: bool) -> rrb.Container
     return rrb.Horizontal(run, right, column_shares=[2, 3], name="Trials")
 
 
-def _space(name: str, eye: rrb.EyeControls3D) -> rrb.Spatial3DView:
-    return rrb.Spatial3DView(origin="/scene", name=name, eye_controls=eye, line_grid=False)
+def _pages(shape: Shape) -> rrb.Container:
+    """Return the pages of single trials, side by side."""
+    pages = [
+        _page(root, trial, shape) for root, trial in zip(page.ROOTS, shape.trials, strict=False)
+    ]
+    name = " beside ".join(f"Trial {trial}" for trial in shape.trials)
+    return rrb.Horizontal(*pages, name=name)
+
+
+def _page(root: str, trial: int, shape: Shape) -> rrb.Container:
+    head: list[rrb.View | rrb.Container] = [
+        rrb.TextDocumentView(origin=f"/{root}/card", name=f"trial {trial}")
+    ]
+    if shape.tip is not None:
+        head.append(_tip(f"{root}/scene", "tip, force, region of interest", shape))
+    if shape.has_scene:
+        head.append(_arm(f"{root}/scene"))
+    phases = rrb.StateTimelineView(origin=f"/{root}/phase", name=f"phases of trial {trial}")
+    plots = [
+        rrb.TimeSeriesView(origin=f"/{root}/signals/{name}", name=f"{name}, trial {trial}")
+        for name in shape.groups[:CHARTS]
+    ]
+    # side by side, a card beside its scene would leave neither room
+    many = len(shape.trials) > 1
+    top = rrb.Tabs(*head, active_tab=min(1, len(head) - 1)) if many else rrb.Horizontal(*head)
+    return rrb.Vertical(top, phases, *plots, row_shares=[5, 1, *[2] * len(plots)])
+
+
+def _tip(root: str, name: str, shape: Shape) -> rrb.Spatial3DView:
+    assert shape.tip is not None
+    origin = f"/{root}/{shape.tip_frame}" if shape.tip_frame else f"/{root}"
+    # what stands in front of the lock hides what is to be seen
+    front = f"- {origin}/{PurePosixPath(origin).name}.front/**"
+    contents = [f"+ /{root}/**", front]
+    return rrb.Spatial3DView(
+        origin=origin,
+        name=name,
+        contents=contents,
+        eye_controls=_eye(shape.tip, down_z=shape.in_lock),
+        line_grid=False,
+    )
+
+
+def _arm(root: str) -> rrb.Spatial3DView:
+    eye = rrb.EyeControls3D(
+        kind="Orbital", position=(1.5, -1.3, 0.9), look_target=(0.25, 0.0, 0.35), eye_up=(0, 0, 1)
+    )
+    return rrb.Spatial3DView(origin=f"/{root}", name="scene", eye_controls=eye, line_grid=False)
+
+
+def _partition(shape: Shape) -> rrb.Container:
+    views = [
+        rrb.Spatial2DView(
+            origin=f"/partition/{slot}",
+            name=f"slice {slot + 1}: white is accepted, blue is not",
+            visual_bounds=rrb.VisualBounds2D(
+                x_range=(-14.0, SIDE + 6.0), y_range=(-8.0, SIDE + 12.0)
+            ),
+        )
+        for slot in range(shape.slices)
+    ]
+    return rrb.Grid(*views, grid_columns=2, name="Partition")
 
 
 def _eye(tip: npt.NDArray[np.float32], *, down_z: bool) -> rrb.EyeControls3D:
@@ -121,13 +198,17 @@ def _parameters(config: RunConfig | None) -> rrb.Container:
     return rrb.Grid(*views, name="Parameters")
 
 
-def _played(groups: Sequence[str], eye: rrb.EyeControls3D | None) -> rrb.Container:
-    plots = [rrb.TimeSeriesView(origin=f"/signals/{name}", name=name) for name in groups[:PLAYED]]
+def _played(shape: Shape) -> rrb.Container:
+    plots = [
+        rrb.TimeSeriesView(origin=f"/signals/{name}", name=name) for name in shape.groups[:PLAYED]
+    ]
     phases = rrb.StateTimelineView(origin="/phase", name="phase")
     column = rrb.Vertical(phases, *plots)
-    if eye is None:
+    if shape.tip is None:
         return rrb.Vertical(column, name="Played")
-    return rrb.Horizontal(column, _space("tip, played", eye), name="Played")
+    spaces = [_tip("scene", "tip, played", shape)]
+    spaces += [_arm("scene")] if shape.has_scene else []
+    return rrb.Horizontal(column, rrb.Vertical(*spaces), name="Played")
 
 
 def _evaluators() -> rrb.Container:

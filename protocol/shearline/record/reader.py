@@ -30,6 +30,8 @@ from shearline.protocol.messages import (
     Status,
     TraceData,
 )
+from shearline.protocol.pose import Placed
+from shearline.protocol.scene import SceneData
 from shearline.record.frames import Frame, chunks_in, frame_at, frames, records_of
 from shearline.record.parts import is_live, parts
 from shearline.record.phases import Phase, phases_of
@@ -50,6 +52,7 @@ _HELD = frozenset(
         Counted,
         EpisodeClosed,
         EvaluatorState,
+        SceneData,
         Snapshot,
         Status,
         TraceData,
@@ -67,6 +70,7 @@ class Trace:
         t_s: The trial's clock ``(samples,)`` [s].
         columns: Name to ``(unit, values (samples,))``, without the clock.
         events: ``(t_s, name)`` of phase changes, in order.
+        placed: Bodies of the scene whose place is this trial's own.
     """
 
     trial: int
@@ -74,6 +78,7 @@ class Trace:
     t_s: Array
     columns: dict[str, tuple[str, Array]]
     events: tuple[tuple[float, str], ...]
+    placed: tuple[Placed, ...] = ()
 
     def __getitem__(self, name: str) -> Array:
         """Return the values ``(samples,)`` of one column, the clock as ``"t_s"``."""
@@ -97,6 +102,7 @@ class Run:
         episodes: Closed episodes, in order.
         evaluators: Every change of an evaluator's state, in order of time.
         snapshots: The learner's models, in order of episode.
+        scene: What trials look like, as last said; ``None`` where nobody said.
         status: The run at its last glance; ``None`` where none was recorded.
         phases: Trial number to the phases of its last traced attempt.
         damage: One sentence for each damage found; empty for a sound record.
@@ -109,6 +115,7 @@ class Run:
     episodes: list[EpisodeClosed] = field(default_factory=list)
     evaluators: list[EvaluatorState] = field(default_factory=list)
     snapshots: list[Snapshot] = field(default_factory=list)
+    scene: SceneData | None = None
     status: Status | None = None
     phases: dict[int, tuple[Phase, ...]] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
@@ -244,6 +251,8 @@ def _hold(run: Run, found: _Found) -> None:
             run.episodes.append(episode)
         case EvaluatorState() as evaluator:
             run.evaluators.append(evaluator)
+        case SceneData() as scene:
+            run.scene = scene
         case Snapshot() as snapshot:
             run.snapshots.append(snapshot)
         case Status() as status:
@@ -328,6 +337,7 @@ def to_trace(trace: TraceData) -> Trace:
         t_s=values[0],
         columns={name: (unit, column) for name, unit, column in list(named)[1:]},
         events=tuple(trace.events),
+        placed=tuple(trace.placed),
     )
 
 

@@ -18,8 +18,10 @@ import rerun as rr
 from rerun.experimental import ViewerClient
 
 from shearline.protocol.errors import RecordError
+from shearline.record.layout import layout
+from shearline.record.page import CLOCK
 from shearline.record.reader import open_run
-from shearline.record.view import APPLICATION, draw, layout_of
+from shearline.record.view import APPLICATION, draw_all, numbers, shape_of
 from shearline.record.viewer import executable, free_port, quiet_environment
 
 #: A picture that has not changed for so many looks is complete ...
@@ -28,7 +30,15 @@ STILL_LOOKS = 3
 PATIENCE_S = 60.0
 
 
-def screenshot(run_dir: Path | str, path: Path | str, *, trial: int = 0, tab: int = 0) -> None:
+def screenshot(
+    run_dir: Path | str,
+    path: Path | str,
+    *,
+    trial: int = 0,
+    tab: int = 0,
+    pages: Sequence[str] = (),
+    at_s: float = 0.0,
+) -> None:
     """Draw a run in a viewer without a window and write what it shows.
 
     Args:
@@ -36,6 +46,8 @@ def screenshot(run_dir: Path | str, path: Path | str, *, trial: int = 0, tab: in
         path: PNG file to write.
         trial: Trial under the cursor.
         tab: Which tab of the layout stands in front, from 0.
+        pages: Trials to show in full; their page is tab 0.
+        at_s: Where the cursor stands on a page [s].
 
     Raises:
         RecordError: If there is no such run, or no graphics driver.
@@ -44,11 +56,15 @@ def screenshot(run_dir: Path | str, path: Path | str, *, trial: int = 0, tab: in
     with _quiet(), _headless() as client:
         stream = rr.RecordingStream(APPLICATION, recording_id="screenshot")
         stream.connect_grpc(client.url)
-        draw(stream, run)
-        stream.send_blueprint(layout_of(run, active_tab=tab))
+        chosen = numbers(run, pages)
+        draw_all(stream, run, chosen)
+        stream.send_blueprint(layout(shape_of(run, chosen), active_tab=tab))
         stream.flush()
         _settle(client)
-        client.set_time("trial", sequence=trial, play_state="paused")
+        if chosen and tab == 0:
+            client.set_time(CLOCK, duration=at_s, play_state="paused")
+        else:
+            client.set_time("trial", sequence=trial, play_state="paused")
         Path(path).write_bytes(_settle(client))
         stream.disconnect()
 
@@ -60,9 +76,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("out", type=Path, help="PNG file to write")
     parser.add_argument("--trial", type=int, default=0, help="trial under the cursor")
     parser.add_argument("--tab", type=int, default=0, help="tab in front, from 0")
+    parser.add_argument("--page", action="append", default=[], help="a trial to show in full")
+    parser.add_argument("--at", type=float, default=0.0, help="cursor on a page [s]")
     asked = parser.parse_args(arguments)
     try:
-        screenshot(asked.run, asked.out, trial=asked.trial, tab=asked.tab)
+        screenshot(
+            asked.run,
+            asked.out,
+            trial=asked.trial,
+            tab=asked.tab,
+            pages=asked.page,
+            at_s=asked.at,
+        )
     except RecordError as error:
         print(error, file=sys.stderr)  # noqa: T201 - a program's one sentence
         return 4

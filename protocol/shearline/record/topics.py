@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from shearline.protocol import messages
 from shearline.protocol.messages import Message
+from shearline.protocol.scene import SceneData
 
 RUN = "/run"
 LOG = "/log"
@@ -67,6 +68,11 @@ TOPICS: dict[type[Message], Topic] = {
         ),
         (messages.EvaluatorState, "/evaluator/state", "where one evaluator stands, at each change"),
         (messages.Snapshot, "/learner/model", "the learner's model after an episode, JSON text"),
+        (
+            SceneData,
+            "/scene/bodies",
+            "what trials look like; columns move it",
+        ),
         (messages.Status, "/status", "the run at a glance, about twice a second"),
         (messages.Wire, "/wire", "protocol messages as the learner saw or sent them, msgpack"),
     )

@@ -6,12 +6,11 @@ with a bounded inbox. What is drawn, and where, is said elsewhere.
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rerun as rr
-import rerun.blueprint as rrb
 
 from shearline.protocol import codec
 from shearline.protocol.errors import ProtocolError
@@ -22,14 +21,20 @@ from shearline.protocol.messages import (
     EpisodeClosed,
     EvaluatorState,
     Message,
+    Snapshot,
     Status,
     TraceData,
 )
+from shearline.protocol.scene import SceneData
 from shearline.record import columns
+from shearline.record.bodies import paths
 from shearline.record.inbox import Inbox
-from shearline.record.layout import layout
+from shearline.record.layout import Shape, layout
+from shearline.record.page import ROOTS, draw_page
 from shearline.record.picture import Picture
+from shearline.record.ranks import choose, ranks
 from shearline.record.reader import Run, Trace, open_run, to_trace
+from shearline.record.slices import SLICES
 from shearline.record.topics import RunConfig
 from shearline.record.viewer import check_ended_well, free_port, viewer
 
@@ -37,47 +42,113 @@ APPLICATION = "shearline"
 #: Traces kept waiting for a slow viewer; older ones are left out of a live view.
 LIVE_BULK_BYTES = 16 * 2**20
 TICK_S = 0.1
+#: Traces drawn before they are handed to the viewer's library: bounds memory.
+FLUSH_TRACES = 250
 
 
-def save(run_dir: Path | str, path: Path | str) -> Run:
+def save(run_dir: Path | str, path: Path | str, *, trials: Sequence[str] = ()) -> Run:
     """Write the view of a run into a Rerun file, for machines without a screen.
 
     Args:
         run_dir: The run folder.
         path: File to write, ending in ``.rrd``.
+        trials: At most two trials to show in full, as :func:`shearline.record.ranks.choose` reads
+            them.
 
     Returns:
         The run that was drawn; its ``damage`` says what could not be read.
 
     Raises:
-        RecordError: If there is no such run folder, or a trace cannot be read.
+        RecordError: If there is no such run folder or trial, or a trace cannot be read.
     """
     run = open_run(run_dir)
+    chosen = numbers(run, trials)
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{run.name or run.run_dir.name}")
-    stream.save(path, default_blueprint=layout_of(run))
-    draw(stream, run)
-    stream.flush()
+    stream.save(path, default_blueprint=layout(shape_of(run, chosen)))
+    draw_all(stream, run, chosen)
     stream.disconnect()
     return run
 
 
-def view(run_dir: Path | str) -> Run:
+def view(run_dir: Path | str, *, trials: Sequence[str] = ()) -> Run:
     """Show a run in the viewer; returns when the viewer is closed.
 
+    The window is there at once, outcomes follow within seconds, traces after them.
+
+    Args:
+        run_dir: The run folder.
+        trials: As for :func:`save`.
+
     Raises:
-        RecordError: If there is no such run folder, no viewer, or no screen.
+        RecordError: If there is no such run folder or trial, no viewer, or no screen.
     """
-    with tempfile.TemporaryDirectory(prefix="shearline-view-") as folder:
-        path = Path(folder) / "run.rrd"
-        run = save(run_dir, path)
-        with viewer([str(path)]) as child:
-            check_ended_well(child)
+    run = open_run(run_dir)
+    chosen = numbers(run, trials)
+    port = free_port()
+    with viewer([], port) as child:
+        stream = connected(port)
+        stream.send_blueprint(layout(shape_of(run, chosen)))
+        draw_all(stream, run, chosen, closed=lambda: child.poll() is not None)
+        check_ended_well(child)
     return run
 
 
-def draw(stream: rr.RecordingStream, run: Run) -> Picture:
+def connected(port: int) -> rr.RecordingStream:
+    """Return a stream to the viewer that listens on a port of this machine."""
+    stream = rr.RecordingStream(APPLICATION)
+    stream.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy")
+    return stream
+
+
+def numbers(run: Run, words: Sequence[str]) -> list[int]:
+    """Return the numbers of the trials that are to have a page.
+
+    Raises:
+        RecordError: If there is no such trial.
+    """
+    return [choose(run.outcomes, word) for word in words]
+
+
+def draw_all(
+    stream: rr.RecordingStream,
+    run: Run,
+    trials: Sequence[int] = (),
+    *,
+    closed: Callable[[], bool] = lambda: False,
+) -> None:
+    """Draw the pages of some trials, then the run; give up once ``closed`` says so."""
+    outcomes = {outcome.trial: outcome for outcome in run.outcomes}
+    for root, trial in zip(ROOTS, trials, strict=False):
+        draw_page(stream, root, outcomes[trial], run.traces(trial), run.config, run.scene)
+    draw(stream, run, closed=closed)
+    if not closed():
+        stream.flush()
+
+
+def draw(
+    stream: rr.RecordingStream, run: Run, *, closed: Callable[[], bool] = lambda: False
+) -> Picture:
     """Draw everything a run has on record; return the picture, to be drawn on."""
-    picture = Picture(stream, run.config)
+    picture = Picture(
+        stream,
+        run.config,
+        scene=run.scene,
+        n_trials=len(run.traced()),
+        ranks=ranks(run.outcomes),
+    )
+    _draw_outcomes(picture, run)
+    for drawn, trace in enumerate(run.all_traces(), start=1):
+        picture.trace(trace)
+        if drawn % FLUSH_TRACES == 0:
+            picture.flush()
+            if closed():
+                break
+    picture.flush()
+    return picture
+
+
+def _draw_outcomes(picture: Picture, run: Run) -> None:
+    """Draw what is there without any trace, and have it shown at once."""
     for outcome in run.outcomes:
         picture.outcome(outcome)
     last_trial = {outcome.episode: outcome.trial for outcome in run.outcomes}
@@ -85,9 +156,19 @@ def draw(stream: rr.RecordingStream, run: Run) -> Picture:
         picture.episode(episode, last_trial.get(episode.episode))
     for state in run.evaluators:
         picture.evaluator(state)
-    for trace in run.all_traces():
-        picture.trace(trace)
-    return picture
+    _draw_partition(picture, run)
+    picture.flush()
+
+
+def _draw_partition(picture: Picture, run: Run) -> None:
+    """Draw each episode's model from the first of its trials on."""
+    picture.choose_slices(run.outcomes)
+    first_trial: dict[int, int] = {}
+    for proposed in run.proposed.values():
+        known = first_trial.get(proposed.episode, proposed.trial)
+        first_trial[proposed.episode] = min(known, proposed.trial)
+    for snapshot in run.snapshots:
+        picture.snapshot(snapshot, first_trial.get(snapshot.episode))
 
 
 def follow(
@@ -119,13 +200,16 @@ def follow(
         link.watch(Keys(run).live_learners(), inbox)
         inbox.wait_for_learner(timeout_s)
         so_far = open_run(run_dir) if run_dir else None
-        live = _Live(stream, so_far)
+        live, shown_s = _Live(stream, so_far), 0.0
         ready()
         while not closed():
             item = inbox.get(TICK_S)
             if item is not None:
                 live.take(item.payload)
-            elif live.ended:
+            if item is None or time.monotonic() > shown_s + TICK_S:
+                live.flush()
+                shown_s = time.monotonic()
+            if item is None and live.ended:
                 return
 
 
@@ -141,9 +225,8 @@ def view_live(connect: str, run_dir: Path | None = None) -> None:
         RecordError: If there is no viewer or no screen.
     """
     port = free_port()
-    stream = rr.RecordingStream(APPLICATION)
     with viewer([], port) as child:
-        stream.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy")
+        stream = connected(port)
         follow(connect, stream, closed=lambda: child.poll() is not None, run_dir=run_dir)
         check_ended_well(child)
 
@@ -155,8 +238,9 @@ class _Live:
         self.ended = False
         self._stream = stream
         self._config = so_far.config if so_far else None
+        self._scene = so_far.scene if so_far else None
         self._laid_out = bool(so_far and so_far.traced())
-        self._stream.send_blueprint(layout_of(so_far) if so_far else layout_for(None, None))
+        self._stream.send_blueprint(layout(shape_of(so_far) if so_far else Shape()))
         self._picture = draw(stream, so_far) if so_far else Picture(stream, None)
 
     def take(self, payload: bytes) -> None:
@@ -171,36 +255,58 @@ class _Live:
                 self._picture.episode(message)
             case EvaluatorState():
                 self._picture.evaluator(message)
+            case Snapshot():
+                self._picture.snapshot(message)
+            case SceneData():
+                self._see(message)
             case TraceData():
                 self._trace(message)
             case Status(state="ended"):
                 self.ended = True
 
+    def flush(self) -> None:
+        self._picture.flush()
+
+    def _see(self, scene: SceneData) -> None:
+        """Take what trials look like, as long as none has been drawn otherwise."""
+        if self._scene is None and not self._laid_out:
+            self._scene = scene
+            self._picture.see(scene)
+
     def _trace(self, message: TraceData) -> None:
         trace = to_trace(message)
         if not self._laid_out:
             self._laid_out = True
-            self._stream.send_blueprint(layout_for(self._config, trace))
+            self._stream.send_blueprint(layout(shape_for(self._config, trace, self._scene)))
         self._picture.trace(trace)
 
 
-def layout_for(
-    config: RunConfig | None, trace: Trace | None, *, active_tab: int = 0
-) -> rrb.Blueprint:
-    """Return the layout for a run whose traces are like this one."""
+def shape_for(
+    config: RunConfig | None,
+    trace: Trace | None,
+    scene: SceneData | None,
+    *,
+    slices: int = 0,
+    trials: Sequence[int] = (),
+) -> Shape:
+    """Return what a run has to show whose traces are like this one."""
     if trace is None:
-        return layout(config, [], tip=None, active_tab=active_tab)
-    return layout(
+        return Shape(config, slices=slices, trials=trials)
+    return Shape(
         config,
-        [group.name for group in columns.groups(trace)],
+        groups=[group.name for group in columns.groups(trace)],
         tip=columns.tip(trace),
         in_lock=columns.in_lock(trace),
-        active_tab=active_tab,
+        tip_frame=paths(scene)[scene.tip_in] if scene else "",
+        has_scene=scene is not None,
+        slices=slices,
+        trials=trials,
     )
 
 
-def layout_of(run: Run, *, active_tab: int = 0) -> rrb.Blueprint:
-    """Return the layout for a run, with one of its tabs in front."""
+def shape_of(run: Run, trials: Sequence[int] = ()) -> Shape:
+    """Return what a run has to show, with pages for some trials."""
     traced = run.traced()
     first = run.traces(traced[0])[0] if traced else None
-    return layout_for(run.config, first, active_tab=active_tab)
+    slices = SLICES if run.snapshots else 0
+    return shape_for(run.config, first, run.scene, slices=slices, trials=trials)

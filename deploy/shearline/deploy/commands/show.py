@@ -17,6 +17,12 @@ def register(commands: Subparsers) -> None:
     view.add_argument("run", metavar="RUN_DIR", type=Path, nargs="?")
     view.add_argument("--live", action="store_true", help="attach to the run that is going on")
     view.add_argument("--save", metavar="FILE.rrd", type=Path, help="write a file, open no window")
+    view.add_argument(
+        "--trial",
+        metavar="TRIAL",
+        help="show one trial in full: its number, best, worst, failure, or why it failed (torque)",
+    )
+    view.add_argument("--beside", metavar="TRIAL", help="and another one beside it")
     add_connect(view)
     view.set_defaults(handler=view_run)
 
@@ -30,7 +36,13 @@ def view_run(arguments: argparse.Namespace) -> int:
         return Exit.OK
     if arguments.run is None:
         raise ConfigError("which run? give its folder, or --live for the one that is going on")
-    run = view.save(arguments.run, arguments.save) if arguments.save else view.view(arguments.run)
+    if arguments.beside and not arguments.trial:
+        raise ConfigError("--beside which? name the first trial with --trial")
+    trials = [word for word in (arguments.trial, arguments.beside) if word]
+    if arguments.save:
+        run = view.save(arguments.run, arguments.save, trials=trials)
+    else:
+        run = view.view(arguments.run, trials=trials)
     for sentence in run.damage:
         print(f"shearline: {sentence}", file=sys.stderr)
     return Exit.OK

@@ -1,0 +1,115 @@
+"""How a learner parts the space, evaluated from its snapshot alone.
+
+A snapshot is plain numbers; of the kinds of filter, those written down here can be drawn. No
+learner is known: what reads a record must not need what wrote it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+#: Points along each side of a slice: finer than a screen's patience, coarser than its pixels.
+SIDE = 72
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """What a model rests on.
+
+    Attributes:
+        u: Tuples ``(m, n)`` in unit coordinates.
+        good: Which count as good ``(m,)``.
+    """
+
+    u: Array
+    good: npt.NDArray[np.bool_]
+
+
+def samples_of(model: Mapping[str, Any]) -> Samples | None:
+    """Return the samples of a snapshot, or ``None`` if it has none."""
+    found = model.get("samples")
+    if not isinstance(found, Mapping) or not found.get("u"):
+        return None
+    u = np.asarray(found["u"], dtype=np.float64)
+    good = np.asarray(found.get("good", np.zeros(len(u))), dtype=np.bool_)
+    return Samples(u, good) if u.ndim == 2 and good.shape == (len(u),) else None
+
+
+def decision(model: Mapping[str, Any], at: Array, x: int, y: int) -> Array | None:
+    """Return the filter's values on one slice, at least 0 where it accepts.
+
+    Along a slice only two coordinates change, and the kernel ``exp(-gamma |u - s|^2)`` is the
+    product of its coordinates' shares: the slice costs two small products instead of a kernel
+    between all points and all supports.
+
+    Args:
+        model: A snapshot.
+        at: Tuple ``(n,)`` that the slice goes through.
+        x: Parameter along the columns, from low to high.
+        y: Parameter along the rows, from high to low, as a picture has them.
+
+    Returns:
+        ``(SIDE, SIDE)``; ``None`` while there is no filter, or where its kind is not known here.
+    """
+    part = model.get("partition")
+    if not isinstance(part, Mapping) or part.get("kind") != "svm-rbf":
+        return None
+    support = np.asarray(part["support"], dtype=np.float64)
+    if support.ndim != 2 or support.shape[1] != len(at):
+        return None
+    gamma = float(part["gamma"])
+    steps = (np.arange(SIDE) + 0.5) / SIDE
+    rest = np.delete(support - at, [x, y], axis=1)
+    weight = np.asarray(part["dual"], dtype=np.float64) * np.exp(-gamma * np.sum(rest**2, axis=1))
+    along_x = np.exp(-gamma * (steps[:, None] - support[:, x]) ** 2)
+    along_y = np.exp(-gamma * (steps[::-1, None] - support[:, y]) ** 2)
+    values: Array = (along_y * weight) @ along_x.T + float(part["intercept"])
+    return values
+
+
+def middle(model: Mapping[str, Any], samples: Samples) -> Array:
+    """Return the tuple ``(n,)`` that slices go through: the middle of what is good.
+
+    The mean of the heaviest component of the proposal mixture, else the median of the good
+    samples, else of all.
+    """
+    mixture = model.get("mixture")
+    if isinstance(mixture, Mapping) and mixture.get("weights"):
+        mean = np.asarray(mixture["means"], dtype=np.float64)[int(np.argmax(mixture["weights"]))]
+        if mean.shape == samples.u.shape[1:]:
+            return np.array(mean)
+    chosen = samples.u[samples.good] if samples.good.any() else samples.u
+    median: Array = np.median(chosen, axis=0)
+    return median
+
+
+def telling(u: Array, success: Sequence[bool] | npt.NDArray[np.bool_]) -> list[int]:
+    """Return the parameters in order of how far apart they keep successes and failures.
+
+    The distance is that of Kolmogorov and Smirnov between the two empirical distributions; where
+    one kind is missing, parameters stay in their own order.
+
+    Args:
+        u: Tuples ``(m, n)``.
+        success: Their outcomes ``(m,)``.
+    """
+    won = np.asarray(success, dtype=np.bool_)
+    n_parameters = u.shape[1]
+    if won.all() or not won.any():
+        return list(range(n_parameters))
+    distances = [_distance(u[won, j], u[~won, j]) for j in range(n_parameters)]
+    return sorted(range(n_parameters), key=lambda j: -distances[j])
+
+
+def _distance(a: Array, b: Array) -> float:
+    both = np.concatenate([a, b])
+    share_a = np.searchsorted(np.sort(a), both, side="right") / len(a)
+    share_b = np.searchsorted(np.sort(b), both, side="right") / len(b)
+    return float(np.max(np.abs(share_a - share_b)))
