@@ -9,6 +9,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -88,18 +89,20 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _one(arguments: argparse.Namespace, run: Run) -> int:
     """Run one trial again and show it the way that was asked for."""
-    from shearline.deploy.replay import recorded, words  # noqa: PLC0415 - with what runs trials
+    from shearline.deploy.replay import words  # noqa: PLC0415 - with what runs trials
+    from shearline.deploy.replay.recorded import Recorded, load  # noqa: PLC0415
     from shearline.evaluator.replay import again, change_of, check_ended, judge  # noqa: PLC0415
     from shearline.protocol.space import Space  # noqa: PLC0415
 
-    name = recorded.task_name(run, arguments.task)
-    case = recorded.case_of(run, arguments.trial)
+    recorded = Recorded(run)
+    name = recorded.task_name(arguments.task)
+    case = recorded.case(arguments.trial)
     change = change_of(Space(case.task.space), arguments.changes, arguments.seed)
     if arguments.verify:
         check_ended(case)
     if arguments.video:
         _ready_to_film(name, arguments.video)
-    task = recorded.load(name)
+    task = load(name)
     replayed = again(task, case, change)
     verified = judge(replayed, task.spec) if case.ended and not change else None
     if not arguments.json:
@@ -158,42 +161,36 @@ def _film(replayed: Replayed, path: Path, speed: float) -> None:
 
 def _all(arguments: argparse.Namespace, run: Run) -> int:
     """Verify every trial that can be, and say so in one last line."""
-    from shearline.deploy.replay import many, recorded, words  # noqa: PLC0415
+    from shearline.deploy.replay import many, words  # noqa: PLC0415 - with what runs trials
+    from shearline.deploy.replay.recorded import Recorded  # noqa: PLC0415
 
-    name = recorded.task_name(run, arguments.task)
-    left_out = Counter(why for _, why in recorded.unverifiable(run))
+    recorded = Recorded(run)
+    name = recorded.task_name(arguments.task)
+    left_out = Counter(why for _, why in recorded.unverifiable())
     total = len(run.outcomes) + left_out["never ended"] - left_out.total()
     if total == 0:
-        raise ConfigError(f"nothing in {run.run_dir} can be verified: {_counted(left_out)}")
+        raise ConfigError(f"nothing in {run.run_dir} can be verified: {words.counted(left_out)}")
     workers = min(arguments.workers or os.cpu_count() or 1, total)
     start_s = time.monotonic()
     different = []
-    verified = many.verify_all(name, recorded.cases_of(run), workers)
+    verified = many.verify_all(name, recorded.cases(), workers)
     for one in _progress(verified, total, "verified"):
+        if not one.identical:
+            different.append(one.trial)
         if arguments.json:
             print(json.dumps(words.verified_json(one)), flush=True)
         elif not one.identical:
             print(words.sentence(one), flush=True)
-        if not one.identical:
-            different.append(one.trial)
-    wall_s = time.monotonic() - start_s
-    if arguments.json:
-        summary = {
-            "run": run.name,
-            "trials": total,
-            "identical": total - len(different),
-            "different": different,
-            "left_out": dict(left_out),
-            "workers": workers,
-            "wall_s": wall_s,
-        }
-        print(json.dumps(summary))
-    else:
-        rest = f"; left out: {_counted(left_out)}" if left_out else ""
-        print(
-            f"{total - len(different)} of {total} trials came out identical to the last bit"
-            f" ({workers} processes, {wall_s:.0f} s){rest}"
-        )
+    summary = words.Summary(
+        run=run.name,
+        trials=total,
+        identical=total - len(different),
+        different=different,
+        left_out=dict(left_out),
+        workers=workers,
+        wall_s=time.monotonic() - start_s,
+    )
+    print(json.dumps(asdict(summary)) if arguments.json else summary)
     return Exit.RUN_FAILED if different else Exit.OK
 
 
@@ -211,10 +208,6 @@ def _progress(items: Iterable[T], total: int, what: str) -> Iterator[T]:
         transient=True,
         disable=not console.is_terminal,
     )
-
-
-def _counted(reasons: Counter[str]) -> str:
-    return ", ".join(f"{count} {why}" for why, count in reasons.items()) or "it has no trials"
 
 
 def _say(sentence: str) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from shearline.evaluator.replay import Change, Replayed, Verification
@@ -65,6 +66,43 @@ def sentence(verified: Verification) -> str:
         though = f", though {verified.why}" if verified.why else ""
         return f"trial {verified.trial} came out identical to the last bit{though}"
     return f"trial {verified.trial} did not come out again: {verified.why}"
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """How the verification of a whole run went; its fields are the last line of JSON.
+
+    Attributes:
+        run: Name of the run.
+        trials: How many were verified.
+        identical: How many of them came out again.
+        different: Numbers of those that did not come out again.
+        left_out: Why others could not be verified, and how many.
+        workers: Processes that ran them.
+        wall_s: How long it took [s].
+    """
+
+    run: str
+    trials: int
+    identical: int
+    different: list[int]
+    left_out: dict[str, int]
+    workers: int
+    wall_s: float
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        rest = f"; left out: {counted(self.left_out)}" if self.left_out else ""
+        processes = "1 process" if self.workers == 1 else f"{self.workers} processes"
+        return (
+            f"{self.identical} of {self.trials} trials came out identical to the"
+            f" last bit ({processes}, {self.wall_s:.0f} s){rest}"
+        )
+
+
+def counted(reasons: Mapping[str, int]) -> str:
+    """Say how many trials were left out, and why."""
+    return ", ".join(f"{count} {why}" for why, count in reasons.items()) or "it has no trials"
 
 
 def _changes(replayed: Replayed, change: Change) -> Iterator[str]:
