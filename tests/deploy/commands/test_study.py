@@ -76,6 +76,13 @@ def test_a_plan_is_no_learner_to_compare(
     assert "plan" in capsys.readouterr().err
 
 
-def test_the_studies_are_listed() -> None:
+def test_a_study_without_anyone_to_run_it_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["study", "fig4", "--workers", "0", "--out", str(tmp_path / "out")]) == 2
+    assert "--workers" in capsys.readouterr().err
+
+
+def test_a_study_that_is_not_there_is_refused() -> None:
     with pytest.raises(SystemExit):
         parser().parse_args(["study", "functions"])

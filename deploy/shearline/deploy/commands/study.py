@@ -43,7 +43,7 @@ def _register_fig3(kinds: Subparsers) -> None:
         description="Four episodes of 20 trials: samples, decision region, proposals. The problem"
         " as printed has one maximum; narrow bells, which have two, are drawn below it.",
     )
-    fig3.add_argument("--learner", choices=("psp", "psp-paper"), default="psp")
+    fig3.add_argument("--learner", choices=("psp-paper", "psp"), default="psp-paper")
     fig3.add_argument("--seed", type=at_least(0), default=TYPICAL_SEED, help="the one drawn")
     fig3.add_argument(
         "--experiments", type=positive, default=20, metavar="M", help="seeds counted, default 20"
@@ -92,7 +92,11 @@ def _register_lock(kinds: Subparsers) -> None:
     lock.add_argument("--first-seed", type=at_least(0), default=0, metavar="S")
     lock.add_argument("--fresh", type=positive, default=100, metavar="N", help="default 100")
     lock.add_argument("--workers", type=positive, default=2, metavar="W", help="evaluators")
-    lock.add_argument("--out", type=Path, help="folder for the runs (default runs/study-TIME)")
+    lock.add_argument(
+        "--out",
+        type=Path,
+        help="folder for the runs; complete ones are kept (default runs/lock-TIME)",
+    )
     add_json(lock)
     lock.set_defaults(handler=run_lock)
 
@@ -156,6 +160,8 @@ def run_fig4(arguments: argparse.Namespace) -> int:
     from shearline.learner.registry import LEARNERS, resolve  # noqa: PLC0415
     from shearline.studies import curves, repeat  # noqa: PLC0415
 
+    if not (arguments.workers or arguments.listen):
+        raise ConfigError("nobody would run a repeat: give --workers, or --listen for others")
     learners = list(dict.fromkeys(resolve(name) for name in arguments.learners or LEARNERS))
     if not set(learners) <= set(LEARNERS):
         raise ConfigError(f"a plan does not learn: expected some of {', '.join(LEARNERS)}")
@@ -221,7 +227,7 @@ def run_lock(arguments: argparse.Namespace) -> int:
         range(first, first + arguments.experiments),
         evaluators=arguments.workers,
         fresh=arguments.fresh,
-        folder=arguments.out or Path("runs", time.strftime("study-%Y%m%d-%H%M%S")),
+        folder=arguments.out or Path("runs", time.strftime("lock-%Y%m%d-%H%M%S")),
     ):
         done.append(one)
         if not arguments.json:

@@ -16,7 +16,8 @@ from shearline.studies.peaks_picture import Row
 
 #: No reward of these problems is greater: two bells of height 1.
 REWARD_MAX = 2.0
-#: The switches that suit the picture. With a high price of errors both peaks stay more often.
+#: Switches that suit the picture: with a high price of errors, as the paper wants it, both peaks
+#: stay more often. The literal reading has it already.
 SWITCHES: Mapping[str, Mapping[str, object]] = MappingProxyType({"psp": {"svm_c": 1e3}})
 
 

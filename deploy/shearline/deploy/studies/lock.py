@@ -1,26 +1,24 @@
-"""The learner on the lock, seed by seed: run through the system, then held to its word.
+"""A learner on the lock, seed by seed: run through the system, then held to its word.
 
-Each experiment is a run like any other (Zenoh, evaluators, journal). Afterwards the recommended
-tuple is tried on fresh noise, which is the only honest way to say how often it works.
+Each experiment is a run like any other, which ends by trying what was recommended on fresh noise:
+the only honest way to say how often it works.
 """
 
 from __future__ import annotations
 
+import json
+import math
 import statistics
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from shearline.deploy.launch import Launch, QuietShow
-from shearline.evaluator.builtin import builtin_task
-from shearline.evaluator.local import run_trial
-from shearline.learner.run.seeds import trial_seed
+from shearline.learner.run.folder import SUMMARY
 from shearline.protocol.endpoints import free_endpoint
-from shearline.protocol.messages import OutcomeKind
-from shearline.protocol.space import Space
+from shearline.protocol.errors import RecordError
 
-#: Fresh trials are numbered from here: no run has that many, so their noise is new.
-FRESH_FROM = 1_000_000
 #: "Late" are the last three episodes, as in the tables of the docs.
 LATE_EPISODES = 3
 
@@ -35,7 +33,7 @@ class Experiment:
         claimed: Lower end of the interval the learner states for its recommendation.
         fresh_success: Share of fresh trials in which the recommendation worked.
         fresh_cost: Mean cost of those successes [s]; ``nan`` without any.
-        wall_s: How long the run took [s].
+        wall_s: How long the run took, fresh trials and all [s].
     """
 
     seed: int
@@ -56,6 +54,8 @@ def experiments(
 ) -> Iterator[Experiment]:
     """Yield one experiment per seed: 10 episodes of 20 trials, then ``fresh`` trials.
 
+    Runs that the folder holds complete are read, unfinished ones resumed.
+
     Args:
         task: A built-in task's name.
         learner: Name of the learner.
@@ -66,34 +66,43 @@ def experiments(
 
     Raises:
         RunFailed: If a run fails.
+        RecordError: If a complete run cannot be read.
+        KeyboardInterrupt: If it was interrupted.
     """
     for seed in seeds:
-        run_dir = folder / f"{task}-{learner}-{seed}"
+        run_dir = folder / f"{task}-{learner}-{seed}-{fresh}"
         asked = ["--task", task, "--learner", learner, "--seed", str(seed), "--no-record"]
         launch = Launch(
             run_dir=run_dir,
             listen=free_endpoint(),
             evaluators=evaluators,
             task=None,
-            learner_arguments=[*asked, "--out", str(run_dir)],
+            learner_arguments=[*asked, "--confirm", str(fresh), "--out", str(run_dir)],
         )
-        summary = launch.run(QuietShow())
-        advice = summary["recommendation"]
-        rate, cost = _held_to(task, advice["theta"], seed, fresh)
-        yield Experiment(
-            seed=seed,
-            success=[episode["success_rate"] for episode in summary["episodes"]],
-            claimed=advice["interval"][0],
-            fresh_success=rate,
-            fresh_cost=cost,
-            wall_s=summary["wall_s"],
-        )
+        summary = _complete(run_dir) or launch.run(QuietShow())
+        if summary["state"] == "stopped":
+            raise KeyboardInterrupt
+        yield _experiment(seed, summary)
 
 
-def _held_to(task: str, theta: dict[str, float], seed: int, fresh: int) -> tuple[float, float]:
-    """Return the share of successes and their mean cost over fresh trials of one tuple."""
-    one = builtin_task(task)
-    values = Space(one.spec.space).to_array(theta)
-    verdicts = [run_trial(one, values, trial_seed(seed, FRESH_FROM + i)) for i in range(fresh)]
-    costs = [verdict.cost for verdict in verdicts if verdict.kind is OutcomeKind.SUCCESS]
-    return len(costs) / fresh, statistics.fmean(costs) if costs else float("nan")
+def _complete(run_dir: Path) -> dict[str, Any]:
+    """Return the summary of a run that is complete, else nothing."""
+    path = run_dir / SUMMARY
+    try:
+        summary: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
+    except (OSError, ValueError) as fault:
+        raise RecordError(f"cannot read the summary {path}: {fault}") from None
+    return summary if summary.get("state") == "complete" else {}
+
+
+def _experiment(seed: int, summary: dict[str, Any]) -> Experiment:
+    fresh = summary["confirmation"]
+    rate, cost = fresh["success_rate"], fresh["mean_cost"]
+    return Experiment(
+        seed=seed,
+        success=[episode["success_rate"] for episode in summary["episodes"]],
+        claimed=summary["recommendation"]["interval"][0],
+        fresh_success=math.nan if rate is None else rate,
+        fresh_cost=math.nan if cost is None else cost,
+        wall_s=summary["wall_s"],
+    )
