@@ -63,6 +63,15 @@ class Exhausted(enum.StrEnum):
     BEST = "best"  # the one with the largest decision value
 
 
+class Partitioner(enum.StrEnum):
+    """What parts good from bad."""
+
+    SVM = "svm"  # a support vector machine with an RBF kernel: the paper's
+    FOREST = "forest"  # a random forest
+    BOOSTING = "boosting"  # gradient boosted trees
+    NETWORK = "network"  # a small neural network: the paper's future work
+
+
 @dataclass(frozen=True, slots=True)
 class PSPConfig:
     """Switches and numbers of PSP.
@@ -84,9 +93,10 @@ class PSPConfig:
         neighbours: Trials around a success that say how reliable it is: its reward becomes the
             one to be expected if it were repeated, failures counting -1. 0 takes every success
             at its word, as the paper does.
+        partition: What the filter is; ``svm_c``, ``gammas`` and ``distance`` are the machine's.
         svm_c: C, the price of a sample on the wrong side. The paper wants it high; low, the filter
             is stricter where good samples are few, and never explodes on contradicting labels.
-        balanced: Whether C is weighted inversely to the size of the two classes.
+        balanced: Whether samples are weighted inversely to the size of their class.
         gammas: Kernel widths tried, as multiples of 12 / n: the value at which two uniformly
             random points of the cube have kernel value e**-2.
         distance: Distance whose minimum over the samples chooses gamma.
@@ -107,6 +117,7 @@ class PSPConfig:
     labels: Labels = Labels.NEW
     reward: RewardMap = RewardMap.LINEAR
     neighbours: int = 12
+    partition: Partitioner = Partitioner.SVM
     svm_c: float = 3.0
     balanced: bool = False
     gammas: tuple[float, ...] = (1.0,)

@@ -47,7 +47,7 @@ def renew(model: Model, trials: Trials, seed: int, config: PSPConfig) -> Model:
     Args:
         model: The present one.
         trials: Everything told so far; the latest ``config.fit_samples_max`` are used.
-        seed: For the mixture's own start.
+        seed: For what the mixture and the filter draw while they are fitted.
         config: The reading of the paper.
     """
     kept = window(trials, config.fit_samples_max)
@@ -62,7 +62,7 @@ def renew(model: Model, trials: Trials, seed: int, config: PSPConfig) -> Model:
                 samples = mixture_samples(judged, good, config)
                 mixture, components = fit_mixture(samples, components, seed, config)
             if wins >= config.filter_min:
-                partition = fit_partition(judged.u, good, config)
+                partition = fit_partition(judged.u, good, config, seed)
     return Model(judged, good, threshold_cost, components, mixture, partition)
 
 

@@ -1,118 +1,76 @@
-"""The filtering policy f: an RBF support vector machine parts good from bad (section 3.2.2).
+"""The filtering policy f as a port: anything that gives tuples a decision value can be one.
 
-It is fitted by scikit-learn and evaluated here, so that a decision needs nothing but numpy and a
-snapshot holds the whole function. It knows labels and tuples, not rewards or costs.
+The paper's is a support vector machine (section 3.2.2) and its future work a neural network. All
+of them are fitted by scikit-learn and evaluated here with numpy, so that a snapshot holds the
+whole function and can be drawn by who has only the snapshot. This knows labels and tuples, not
+rewards or costs.
 """
 
 from __future__ import annotations
 
-import math
-import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from shearline.learner.base import Array
-from shearline.learner.psp.config import Distance, PSPConfig
+from shearline.learner.errors import LearnerError
+from shearline.learner.psp.config import Partitioner, PSPConfig
+from shearline.learner.psp.machine import Machine, fit_machine
+from shearline.learner.psp.network import Network, fit_network
+from shearline.learner.psp.trees import Trees, fit_boosting, fit_forest
 
-#: Iterations after which libsvm gives the best function found so far. Separable problems of a
-#: run's size need a few thousand; high C on contradictory labels would take minutes.
-ITERATIONS_MAX = 100_000
 
-
-@dataclass(frozen=True, slots=True)
-class Partition:
-    """A decision function ``f(u) = sum_i dual_i exp(-gamma |u - support_i|^2) + intercept``.
-
-    Attributes:
-        support: Support vectors ``(s, n)`` in unit coordinates.
-        dual: Their signed weights ``(s,)``.
-        gamma: Kernel width.
-        intercept: Constant term.
-        distance: The minimum distance over all samples that won the choice of gamma.
-    """
-
-    support: Array
-    dual: Array
-    gamma: float
-    intercept: float
-    distance: float
+class Partition(Protocol):
+    """A fitted filter: a value, that draws nothing and does not change."""
 
     def decision(self, u: Array) -> Array:
-        """Return ``f`` of tuples ``(m, n)`` as ``(m,)``; at least 0 means accepted."""
-        return kernel(u, self.support, self.gamma) @ self.dual + self.intercept
-
-    def norm(self) -> float:
-        """Return ``|w|``, the length of the plane's normal in feature space."""
-        gram = kernel(self.support, self.support, self.gamma)
-        return math.sqrt(max(float(self.dual @ gram @ self.dual), 0.0))
+        """Return the value of tuples ``(m, n)`` as ``(m,)``; at least 0 means accepted."""
+        ...
 
     def snapshot(self) -> Mapping[str, object]:
-        """Return the function as plain values."""
-        return {
-            "kind": "svm-rbf",
-            "support": self.support.tolist(),
-            "dual": self.dual.tolist(),
-            "gamma": self.gamma,
-            "intercept": self.intercept,
-        }
+        """Return the whole function as plain values; ``kind`` says which it is."""
+        ...
 
 
-def kernel(a: Array, b: Array, gamma: float) -> Array:
-    """Return the RBF kernel ``exp(-gamma |a_i - b_j|^2)`` of ``(m, n)`` and ``(s, n)``."""
-    squares = np.sum(a**2, axis=1)[:, None] + np.sum(b**2, axis=1)[None, :] - 2.0 * (a @ b.T)
-    result: Array = np.exp(-gamma * np.maximum(squares, 0.0))
-    return result
-
-
-def fit_partition(u: Array, good: npt.NDArray[np.bool_], config: PSPConfig) -> Partition | None:
-    """Fit one machine per gamma and keep the one whose nearest sample lies farthest away.
+def fit_partition(
+    u: Array, good: npt.NDArray[np.bool_], config: PSPConfig, seed: int = 0
+) -> Partition | None:
+    """Fit the filter that a configuration asks for.
 
     Args:
         u: Samples ``(m, n)`` in unit coordinates.
         good: Their labels ``(m,)``.
-        config: C, the gammas and the distance that decides.
+        config: Which filter, and its numbers.
+        seed: For filters that draw while they are fitted.
 
     Returns:
-        The partition, or ``None`` while all labels are the same. Of gammas that tie, the
-        smallest, i.e. the smoothest function, wins.
+        The filter, or ``None`` while all labels are the same.
     """
     if good.all() or not good.any():
         return None
-    scale = 12.0 / u.shape[1]
-    best: Partition | None = None
-    for factor in sorted(config.gammas):
-        candidate = _fit_one(u, good, factor * scale, config)
-        if best is None or candidate.distance > best.distance * (1 + 1e-3):
-            best = candidate
-    return best
+    match config.partition:
+        case Partitioner.SVM:
+            return fit_machine(u, good, config)
+        case Partitioner.FOREST:
+            return fit_forest(u, good, seed, balanced=config.balanced)
+        case Partitioner.BOOSTING:
+            return fit_boosting(u, good, seed, balanced=config.balanced)
+        case Partitioner.NETWORK:
+            return fit_network(u, good, seed, balanced=config.balanced)
 
 
-def _fit_one(u: Array, good: npt.NDArray[np.bool_], gamma: float, config: PSPConfig) -> Partition:
-    from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415 - heavy, at the first fit
-    from sklearn.svm import SVC  # noqa: PLC0415
+def restored(snapshot: Mapping[str, Any]) -> Partition:
+    """Return the filter that a snapshot was taken of.
 
-    machine = SVC(
-        C=config.svm_c,
-        gamma=gamma,
-        class_weight="balanced" if config.balanced else None,
-        max_iter=ITERATIONS_MAX,
-        cache_size=200,
+    Raises:
+        LearnerError: If its kind is none of ours.
+    """
+    for kind in (Machine, Trees, Network):
+        if snapshot.get("kind") == kind.kind:
+            return kind.restored(snapshot)
+    raise LearnerError(
+        f"expected a partition of kind {Machine.kind}, {Trees.kind} or {Network.kind},"
+        f" got {snapshot.get('kind')!r}"
     )
-    with warnings.catch_warnings():
-        # A machine stopped early still parts the space; that is what the bound is for.
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        machine.fit(u, good)
-    parted = Partition(
-        support=np.array(machine.support_vectors_),
-        dual=np.array(machine.dual_coef_[0]),
-        gamma=gamma,
-        intercept=float(machine.intercept_[0]),
-        distance=0.0,
-    )
-    distance = float(np.min(np.abs(parted.decision(u))))
-    if config.distance is Distance.GEOMETRIC:
-        distance /= max(parted.norm(), 1e-300)
-    return Partition(parted.support, parted.dual, gamma, parted.intercept, distance)
