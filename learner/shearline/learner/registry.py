@@ -20,6 +20,10 @@ LEARNERS: Mapping[str, str] = MappingProxyType(
     {
         "psp": "shearline.learner.psp.psp:working",
         "psp-paper": "shearline.learner.psp.psp:literal",
+        "hireps": "shearline.learner.hireps:HiREPS",
+        "cmaes": "shearline.learner.cmaes:CMAES",
+        "ga": "shearline.learner.ga:GeneticAlgorithm",
+        "pso": "shearline.learner.pso:ParticleSwarm",
         "random": "shearline.learner.random_search:RandomSearch",
         "lhs": "shearline.learner.lhs:LatinHypercube",
     }

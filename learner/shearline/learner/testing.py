@@ -45,15 +45,20 @@ def thetas(proposals: Iterable[Proposal]) -> Array:
     return np.array([p.theta for p in proposals])
 
 
+def report(learner: Learner, proposals: Iterable[Proposal], verdict: Verdict = bowl) -> None:
+    """Tell what became of proposals, in the order given."""
+    for p in proposals:
+        cost, success = verdict(p)
+        learner.tell(p.trial, cost=cost, success=success)
+
+
 def play(learner: Learner, episodes: int, verdict: Verdict = bowl) -> list[Proposal]:
     """Ask and tell whole episodes in order; return all proposals."""
     asked: list[Proposal] = []
     for _ in range(episodes):
         proposals = learner.ask(learner.episode_length)
         asked += proposals
-        for p in proposals:
-            cost, success = verdict(p)
-            learner.tell(p.trial, cost=cost, success=success)
+        report(learner, proposals, verdict)
     return asked
 
 
@@ -106,17 +111,16 @@ class LearnerContract(ABC):
             learner.tell(p.trial, cost=1.0, success=True)
         assert learner.ask(EPISODE)[-1].trial == 4 * EPISODE + 1
 
-    def test_the_chunks_of_ask_do_not_change_what_is_proposed(self) -> None:
-        """One episode in one call, or one by one."""
-        whole, single = self.fresh(), self.fresh()
+    @pytest.mark.parametrize("chunks", [[1] * EPISODE, [3, 5], [7, 1]])
+    def test_the_chunks_of_ask_do_not_change_what_is_proposed(self, chunks: list[int]) -> None:
+        """One episode in one call, in a few, or one by one."""
+        whole, pieces = self.fresh(), self.fresh()
         for _ in range(3):
             one = whole.ask(EPISODE)
-            other = [single.ask(1)[0] for _ in range(EPISODE)]
+            other = [p for count in chunks for p in pieces.ask(count)]
             np.testing.assert_array_equal(thetas(one), thetas(other))
-            for learner in (whole, single):
-                for p in one:
-                    cost, success = bowl(p)
-                    learner.tell(p.trial, cost=cost, success=success)
+            report(whole, one)
+            report(pieces, other)
 
     # -- seeds and order -------------------------------------------------------------------------
 
@@ -130,17 +134,54 @@ class LearnerContract(ABC):
         first, second = self.fresh(seed=5).ask(EPISODE), self.fresh(seed=6).ask(EPISODE)
         assert not np.array_equal(thetas(first), thetas(second))
 
-    def test_the_order_of_tells_within_an_episode_changes_nothing(self) -> None:
-        """Forwards and backwards."""
-        forwards, backwards = self.fresh(), self.fresh()
+    @pytest.mark.parametrize("shuffle", [0, 1, 2])
+    def test_the_order_of_tells_within_an_episode_changes_nothing(self, shuffle: int) -> None:
+        """Shuffled anew in every episode."""
+        rng = np.random.default_rng(shuffle)
+        ordered, shuffled = self.fresh(), self.fresh()
         for _ in range(4):
-            one, other = forwards.ask(EPISODE), backwards.ask(EPISODE)
+            one, other = ordered.ask(EPISODE), shuffled.ask(EPISODE)
             np.testing.assert_array_equal(thetas(one), thetas(other))
-            for learner, order in ((forwards, one), (backwards, other[::-1])):
-                for p in order:
-                    cost, success = bowl(p)
-                    learner.tell(p.trial, cost=cost, success=success)
-        np.testing.assert_array_equal(forwards.recommend().theta, backwards.recommend().theta)
+            report(ordered, one)
+            report(shuffled, [other[i] for i in rng.permutation(EPISODE)])
+        np.testing.assert_array_equal(ordered.recommend().theta, shuffled.recommend().theta)
+
+    def test_what_is_told_within_an_episode_does_not_change_its_rest(self) -> None:
+        """It counts from the next one on: told at once or at the end is the same."""
+        eager, patient = self.fresh(), self.fresh()
+        for _ in range(3):
+            whole = patient.ask(EPISODE)
+            first = eager.ask(3)
+            report(eager, first)
+            rest = eager.ask(EPISODE - 3)
+            np.testing.assert_array_equal(thetas(whole), thetas(first + rest))
+            report(eager, rest)
+            report(patient, whole)
+
+    def test_learners_side_by_side_do_not_disturb_each_other(self) -> None:
+        """Nor does anyone who uses numpy's global generator, which stays as it was."""
+        alone = play(self.fresh(seed=5), 3)
+        other, together = self.fresh(seed=6), self.fresh(seed=5)
+        state = np.random.get_state()  # noqa: NPY002 - it is what must not be touched
+        asked: list[Proposal] = []
+        for k in range(3):
+            play(other, 1)
+            np.testing.assert_equal(np.random.get_state(), state)  # noqa: NPY002
+            np.random.seed(k)  # noqa: NPY002
+            state = np.random.get_state()  # noqa: NPY002
+            asked += play(together, 1)
+        np.testing.assert_array_equal(thetas(alone), thetas(asked))
+
+    def test_what_was_proposed_is_the_askers_to_change(self) -> None:
+        """Writing into a tuple changes nothing that the learner knows."""
+        careful, careless = self.fresh(), self.fresh()
+        for _ in range(3):
+            one, other = careful.ask(EPISODE), careless.ask(EPISODE)
+            np.testing.assert_array_equal(thetas(one), thetas(other))
+            report(careful, one)
+            report(careless, other)
+            for p in other:
+                p.theta[:] = np.nan
 
     # -- telling ---------------------------------------------------------------------------------
 
@@ -153,27 +194,47 @@ class LearnerContract(ABC):
                     learner.tell(p.trial, cost=1.0 + p.trial, success=True)
         assert learner.space.contains(learner.recommend().theta)
 
-    def test_late_outcomes_are_legal(self) -> None:
-        """Told two episodes after they were asked for."""
-        learner = self.fresh()
-        late = learner.ask(EPISODE)
-        play(learner, 2)
-        for p in late:
-            cost, success = bowl(p)
-            learner.tell(p.trial, cost=cost, success=success)
-        play(learner, 2)
+    @pytest.mark.parametrize("n", [1, 23])
+    def test_outcomes_may_all_be_missing(self, n: int) -> None:
+        """It goes on proposing, recommends something, and claims nothing for it."""
+        learner = self.fresh(n)
+        for p in learner.ask(4 * EPISODE):
+            assert learner.space.contains(p.theta)
+        answer = learner.recommend()
+        assert learner.space.contains(answer.theta)
+        assert answer.interval[0] == 0.0
+
+    def test_late_outcomes_are_legal_in_any_order(self) -> None:
+        """Told two episodes after they were asked for, in between others."""
+        ordered, shuffled = self.fresh(), self.fresh()
+        late = ordered.ask(EPISODE)
+        shuffled.ask(EPISODE)
+        for learner in (ordered, shuffled):
+            play(learner, 2)
+        recent = ordered.ask(EPISODE)
+        shuffled.ask(EPISODE)
+        report(ordered, late + recent)
+        report(shuffled, [*recent[::-1], *late[::-1]])
+        one, other = play(ordered, 2), play(shuffled, 2)
+        np.testing.assert_array_equal(thetas(one), thetas(other))
+
+    def test_an_outcome_told_again_much_later_counts_once(self) -> None:
+        """Episodes after it was first told."""
+        once, again = self.fresh(), self.fresh()
+        first = play(once, 1)
+        play(again, 1)
+        for _ in range(3):
+            one, other = play(once, 1), play(again, 1)
+            np.testing.assert_array_equal(thetas(one), thetas(other))
+            report(again, first)
 
     def test_an_outcome_told_twice_counts_once(self) -> None:
         """The second telling changes nothing."""
         once, twice = self.fresh(), self.fresh()
         for _ in range(3):
-            for p in once.ask(EPISODE):
-                cost, success = bowl(p)
-                once.tell(p.trial, cost=cost, success=success)
-            for p in twice.ask(EPISODE):
-                cost, success = bowl(p)
-                twice.tell(p.trial, cost=cost, success=success)
-                twice.tell(p.trial, cost=cost, success=success)
+            report(once, once.ask(EPISODE))
+            proposals = twice.ask(EPISODE)
+            report(twice, [p for p in proposals for _ in range(2)])
         np.testing.assert_array_equal(thetas(once.ask(EPISODE)), thetas(twice.ask(EPISODE)))
 
     def test_a_second_other_outcome_is_refused_and_the_first_stands(self) -> None:
@@ -205,10 +266,21 @@ class LearnerContract(ABC):
             learner.tell(trial, cost=cost, success=success)
         learner.tell(trial, cost=1.0, success=success)
 
+    def test_numbers_of_any_kind_are_told(self) -> None:
+        """Whole numbers and numpy's own; a snapshot still holds plain ones."""
+        learner = self.fresh()
+        for p in learner.ask(EPISODE):
+            cost, success = bowl(p)
+            learner.tell(p.trial, cost=np.float64(cost), success=success)
+        for p in learner.ask(EPISODE):
+            learner.tell(p.trial, cost=p.trial, success=True)
+        learner.ask(1)
+        _assert_plain(dict(learner.snapshot()))
+
     # -- hard cases ------------------------------------------------------------------------------
 
     @pytest.mark.parametrize("success", [True, False])
-    @pytest.mark.parametrize("n", [1, 23])
+    @pytest.mark.parametrize("n", [1, 23, 100])
     def test_equal_costs_leave_it_working(self, n: int, success: bool) -> None:  # noqa: FBT001
         """All succeed alike, or all fail."""
         learner = self.fresh(n)
