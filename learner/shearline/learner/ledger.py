@@ -15,6 +15,9 @@ import numpy.typing as npt
 from shearline.learner.base import Array
 from shearline.learner.errors import LearnerError
 
+#: Trials there is room for at first.
+ROOM_MIN = 64
+
 
 @dataclass(frozen=True, slots=True)
 class Trials:
@@ -48,24 +51,32 @@ class Trials:
 class Ledger:
     """Tuples by trial number and their outcomes.
 
+    Kept in arrays that grow by doubling: adding and telling take the same time however many
+    trials there are, and handing all of them out copies a few blocks of memory.
+
     Args:
         n: Number of parameters.
     """
 
     def __init__(self, n: int) -> None:
-        self._n = n
-        self._asked: list[Array] = []
-        self._told: dict[int, tuple[float, bool]] = {}
+        self._asked = 0
+        self._u = np.empty((ROOM_MIN, n))
+        self._cost = np.empty(ROOM_MIN)
+        self._success = np.zeros(ROOM_MIN, dtype=np.bool_)
+        self._told = np.zeros(ROOM_MIN, dtype=np.bool_)
 
     @property
     def asked(self) -> int:
         """How many tuples have been asked for; also the next trial's number."""
-        return len(self._asked)
+        return self._asked
 
     def add(self, u: Array) -> int:
         """Enter one tuple ``(n,)`` in unit coordinates and return its trial number."""
-        self._asked.append(u)
-        return len(self._asked) - 1
+        if self._asked == len(self._told):
+            self._grow()
+        self._u[self._asked] = u
+        self._asked += 1
+        return self._asked - 1
 
     def tell(self, trial: int, cost: float, *, success: bool) -> None:
         """Enter one outcome; the same outcome told twice is ignored.
@@ -74,9 +85,9 @@ class Ledger:
             LearnerError: If the trial was never asked for, has another outcome already, or its
                 cost is not a finite number.
         """
-        if not 0 <= trial < len(self._asked):
+        if not 0 <= trial < self._asked:
             raise LearnerError(
-                f"expected a trial that was asked for (0 to {len(self._asked) - 1}), got {trial}:"
+                f"expected a trial that was asked for (0 to {self._asked - 1}), got {trial}:"
                 " tell only what ask returned"
             )
         if not math.isfinite(cost):
@@ -84,8 +95,11 @@ class Ledger:
                 f"expected a finite cost for trial {trial}, got {cost!r}: report a failed trial"
                 " with success=False and the cost it is to be charged"
             )
+        if not self._told[trial]:
+            self._cost[trial], self._success[trial], self._told[trial] = cost, success, True
+            return
         outcome = (float(cost), bool(success))
-        known = self._told.setdefault(trial, outcome)
+        known = (float(self._cost[trial]), bool(self._success[trial]))
         if known != outcome:
             raise LearnerError(
                 f"trial {trial} was told (cost, success) = {known} before, now {outcome}:"
@@ -94,11 +108,12 @@ class Ledger:
 
     def trials(self) -> Trials:
         """Return everything told so far, sorted by trial number."""
-        numbers = sorted(self._told)
-        outcomes = [self._told[k] for k in numbers]
-        return Trials(
-            number=np.array(numbers, dtype=np.int64),
-            u=np.array([self._asked[k] for k in numbers]).reshape(len(numbers), self._n),
-            cost=np.array([cost for cost, _ in outcomes], dtype=np.float64),
-            success=np.array([ok for _, ok in outcomes], dtype=np.bool_),
-        )
+        number = np.flatnonzero(self._told)
+        return Trials(number, self._u[number], self._cost[number], self._success[number])
+
+    def _grow(self) -> None:
+        """Double the room."""
+        self._u = np.concatenate([self._u, np.empty_like(self._u)])
+        self._cost = np.concatenate([self._cost, np.empty_like(self._cost)])
+        self._success = np.concatenate([self._success, np.zeros_like(self._success)])
+        self._told = np.concatenate([self._told, np.zeros_like(self._told)])

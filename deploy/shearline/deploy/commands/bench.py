@@ -8,7 +8,10 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from shearline.deploy.exits import Exit
-from shearline.deploy.options import Subparsers, add_json, positive, seconds
+from shearline.deploy.options import Subparsers, add_json, at_least, positive, seconds
+
+#: A learner is measured once it has been told an episode.
+LEARNER_TRIALS_MIN = 40
 
 
 def register(commands: Subparsers) -> None:
@@ -21,7 +24,13 @@ def register(commands: Subparsers) -> None:
     add_json(sim)
     sim.set_defaults(handler=bench_sim)
 
-    learner = kinds.add_parser("learner", help="time of an update and its proposals by data size")
+    learner = kinds.add_parser(
+        "learner", help="time and memory of an update and its proposals by data size"
+    )
+    learner.add_argument("--learner", default="psp", metavar="NAME", help="default psp")
+    learner.add_argument(
+        "--sizes", type=at_least(LEARNER_TRIALS_MIN), nargs="+", metavar="N", help="trials told"
+    )
     add_json(learner)
     learner.set_defaults(handler=bench_learner)
 
@@ -43,10 +52,18 @@ def bench_sim(arguments: argparse.Namespace) -> int:
 
 
 def bench_learner(arguments: argparse.Namespace) -> int:
-    """Print a row per data size."""
-    from shearline.learner.bench import measure  # noqa: PLC0415 - loads scikit-learn
+    """Print a row per data size, clean and with flipped labels, as each is measured."""
+    import msgspec  # noqa: PLC0415 - with the learner
 
-    return _print(measure(), as_json=arguments.json, single=False)
+    from shearline.learner.bench import SIZES, measure  # noqa: PLC0415 - loads numpy
+
+    rows = []
+    for row in measure(arguments.learner, arguments.sizes or SIZES):
+        rows.append(msgspec.to_builtins(row))
+        if not arguments.json:
+            _print(rows[-1:], as_json=False, single=False)
+            sys.stdout.flush()
+    return _print(rows, as_json=True, single=False) if arguments.json else Exit.OK
 
 
 def bench_transport(arguments: argparse.Namespace) -> int:
