@@ -11,8 +11,9 @@ from collections import deque
 from queue import Empty, SimpleQueue
 
 from shearline.deploy.processes import die_with_parent
+from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import Arrival, open_client
+from shearline.protocol.link import open_client
 
 #: Results kept to be said again long after their acknowledgement.
 KEPT_MAX = 64

@@ -18,8 +18,9 @@ from queue import Empty, SimpleQueue
 
 from shearline.deploy.processes import die_with_parent
 from shearline.protocol.codec import decode, encode
+from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import UP_TOPICS, Keys
-from shearline.protocol.link import Arrival, open_client
+from shearline.protocol.link import open_client
 from shearline.protocol.messages import (
     VERSION,
     Bye,

@@ -6,9 +6,10 @@ from queue import Empty, SimpleQueue
 
 from shearline.protocol.codec import decode
 from shearline.protocol.errors import ProtocolError
+from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import Arrival, open_client
-from shearline.protocol.messages import Ack, Message, Trial
+from shearline.protocol.link import open_client
+from shearline.protocol.messages import Ack, Message, Trial, Verdict
 
 _TOLD: tuple[type[Message], ...] = (Ack, Trial)
 
@@ -39,6 +40,9 @@ class Witness:
                 message = decode(payload, *_TOLD)
             except ProtocolError:
                 continue  # somebody's garbage
+            if isinstance(message, Trial):
+                boot, verdict = message.boot, Verdict.COUNTED
+                messages += [Ack(boot=boot, token=t, verdict=verdict) for t in message.counted]
             if isinstance(message, Ack | Trial):
                 messages.append(message)
 

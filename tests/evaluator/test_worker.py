@@ -25,8 +25,9 @@ from shearline.evaluator.worker import Worker, WorkerConfig, default_name, run_w
 from shearline.protocol.codec import BY_TOPIC, decode, encode
 from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import ConfigError
+from shearline.protocol.intake import Presence
 from shearline.protocol.keys import Address, Keys, check_name, parse
-from shearline.protocol.link import Link, Presence, open_router
+from shearline.protocol.link import Link, open_router
 from shearline.protocol.messages import (
     Ack,
     Bye,
@@ -71,8 +72,7 @@ class TinyLearner:
         self.link: Link = open_router(self.endpoint)
         self.keys = Keys(self.run)
         self.traces: SimpleQueue[Any] = SimpleQueue()
-        for pattern in self.keys.from_evaluators():
-            self.link.subscribe(pattern, self.inbox)
+        self.link.subscribe(self.keys.from_evaluators(), self.inbox)
         self.link.subscribe(self.keys.observed(), self.traces)
         self.link.watch(self.keys.live_evaluators(), self.inbox)
         self.link.announce(self.keys.live_learner(self.epoch))

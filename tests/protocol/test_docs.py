@@ -69,8 +69,7 @@ def test_the_evaluator_on_the_page_takes_part_in_a_run(tmp_path: Path) -> None:
         router.publish(keys.down("tiny", message), encode(message))
 
     with open_router(endpoint) as router:
-        for pattern in keys.from_evaluators():
-            router.subscribe(pattern, inbox)
+        router.subscribe(keys.from_evaluators(), inbox)
         router.announce(keys.live_learner(1))
         with subprocess.Popen([sys.executable, str(script), endpoint]) as process:
             while Bye not in heard:

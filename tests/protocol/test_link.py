@@ -17,8 +17,9 @@ from shearline.protocol import link as link_module
 from shearline.protocol.codec import BULK_BYTES_MAX
 from shearline.protocol.endpoints import check_endpoint, free_endpoint
 from shearline.protocol.errors import LinkError
+from shearline.protocol.intake import Arrival, Presence
 from shearline.protocol.keys import ANY_LEARNER, Keys
-from shearline.protocol.link import Arrival, Link, Presence, discover, open_client, open_router
+from shearline.protocol.link import Link, discover, open_client, open_router
 
 zenoh = pytest.importorskip("zenoh")
 

@@ -5,7 +5,7 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shearline.protocol.link import Arrival, Presence
+from shearline.protocol.intake import Arrival, Presence
 from shearline.record.inbox import Inbox
 
 TRACE = "shearline/@v1/run/obs/trace/sim-0"

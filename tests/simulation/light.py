@@ -9,8 +9,9 @@ from queue import Empty, SimpleQueue
 
 from shearline.protocol.codec import TO_EVALUATOR, decode, encode
 from shearline.protocol.errors import ProtocolError
+from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import Arrival, discover, open_client
+from shearline.protocol.link import discover, open_client
 from shearline.protocol.messages import (
     VERSION,
     Ack,
@@ -76,7 +77,7 @@ class LightEvaluator(threading.Thread):
         with open_client(self._endpoint, 10.0) as link:
             run, _ = discover(link, 10.0)
             keys = Keys(run)
-            for pattern in keys.to_evaluator(self.name):
+            for pattern in (keys.to_evaluator(self.name), keys.all_cmd()):
                 link.subscribe(pattern, inbox)
             link.announce(keys.live_evaluator(self.name, self._boot))
 
@@ -97,6 +98,8 @@ class LightEvaluator(threading.Thread):
             case Welcome():
                 self._welcomed = True
             case Trial():
+                for token in message.counted:
+                    self._hear(Ack(boot=message.boot, token=token, verdict=Verdict.COUNTED), say)
                 self._try(message, say)
             case Ack():
                 self._unacked.pop(message.token, None)

@@ -8,7 +8,8 @@ from queue import Empty, SimpleQueue
 
 from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import LinkError
-from shearline.protocol.link import Arrival, open_client, open_router
+from shearline.protocol.intake import Arrival
+from shearline.protocol.link import open_client, open_router
 
 PING, PONG = "shearline/doctor/ping", "shearline/doctor/pong"
 ROUNDS = 20

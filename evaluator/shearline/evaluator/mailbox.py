@@ -218,7 +218,9 @@ class Mailbox:
                 self._welcome(message, now_s)
             case Refused(why=why, ended=ended):
                 self._leave(0 if ended else 4, why, now_s, finish=False)
-            case Trial():
+            case Trial(counted=counted):
+                for token in counted:
+                    self._acked(token)
                 self._given(message, now_s)
             case Ack(token=token):
                 self._acked(token)

@@ -1,9 +1,8 @@
 """The postman: all that a worker has to do with the network.
 
 It turns what comes in into events, has the mailbox decide, and carries the instructions out: on
-the trial's thread while that one waits for a trial, else on a thread of its own. Zenoh's
-callbacks only put into its queue. It takes no decision itself and does not know what a
-trial is.
+the trial's thread what comes while that one waits for a trial, on a thread of its own everything
+else and whatever time brings. It takes no decision itself and does not know what a trial is.
 """
 
 from __future__ import annotations
@@ -36,17 +35,19 @@ from shearline.evaluator.mail import (
 from shearline.evaluator.mailbox import Mailbox
 from shearline.protocol.codec import BY_TOPIC, decode, encode
 from shearline.protocol.errors import ProtocolError
+from shearline.protocol.intake import Arrival, Presence
 from shearline.protocol.keys import ANY_LEARNER, Keys, parse
-from shearline.protocol.link import Arrival, Link, Presence
+from shearline.protocol.link import Link
 from shearline.protocol.messages import TraceData, Welcome
+from shearline.protocol.scene import SceneData
 
 log = logging.getLogger(__name__)
 
 #: Keys repeat, and taking one apart costs as much as decoding a small message.
 _parse = functools.lru_cache(maxsize=64)(parse)
 
-#: Share of a lease after which the postman's thread looks whether it has to serve; renewals are due
-#: after a quarter of one.
+#: Share of a lease after which the postman's thread looks what came during a trial; renewals are
+#: due after a quarter of one.
 LOOK_LEASES = 0.05
 
 #: Malformed messages that are told to people; the others are only counted.
@@ -65,17 +66,17 @@ class End:
 class Exchange:
     """What the trial's thread and the postman's thread share.
 
-    One of them serves the inbox: the trial's thread while it has nothing to run, so that a trial
-    is not handed from thread to thread, and the postman's thread while a trial runs. ``lock`` is
-    held by whoever serves; queues are safe from anywhere, signal handlers included.
+    The trial's thread waits at the intake while it has nothing to run, so that a trial is not
+    handed from thread to thread; while it runs one, the postman's thread looks there now and then.
+    ``lock`` is held by whoever acts; queues are safe from anywhere, signal handlers included.
 
     Attributes:
-        inbox: Events, arrivals, presences and traces, for whoever serves.
+        inbox: Events, presences, traces and what was said to all, for the postman's thread.
         alarm: Wakes the postman's thread.
         calls: Wakes the trial's thread while there is no postman.
         jobs: For the trial's thread: what to run, what to prepare, or the end.
         postman: Speaks for this evaluator in the run that goes on, if one does.
-        is_busy: Whether the trial's thread has something else to do than to serve.
+        is_busy: Whether the trial's thread has something else to do than to wait at the intake.
         is_open: Whether a trial may begin.
         abort_why: Why the running trial is to end at its next beat, or ``""``.
         leaving: What a signal asked for.
@@ -97,11 +98,9 @@ class Exchange:
     complaints: int = 0
 
     def put(self, item: object) -> None:
-        """Enter something for whoever serves; may be called from any thread or signal handler."""
+        """Enter something for the postman; may be called from any thread or signal handler."""
         self.inbox.put(item)
-        # Read after the item is in; next_job() looks at the inbox after it has changed this.
-        if self.is_busy:
-            self.alarm.put(None)
+        self.alarm.put(None)
 
     def leave(self, code: int, why: str) -> None:
         """Have this process leave; may be called from a signal handler."""
@@ -127,16 +126,15 @@ class Exchange:
     def employ(self, postman: Postman | None) -> None:
         """Let a postman speak from now on, or nobody."""
         with self.lock:
-            self.postman = postman
-        self.inbox.put(Tick())
-        self.calls.put(None)
+            before, self.postman = self.postman, postman
+        self._call(before)
 
     def finish(self, end: End) -> None:
         """Have the trial's thread end, without beginning what waits."""
         self.abort(end.why)
         with self.lock:
             self.jobs.append(end)
-        self.calls.put(None)
+        self._call(self.postman)
 
     def next_job(self) -> Run | Prepare | End:
         """Return what the trial's thread is to do next; until there is something, serve."""
@@ -147,16 +145,12 @@ class Exchange:
                     postman.clear()
                 if self.jobs and (self.is_open or self.abort_why or not self._waits_for_trial()):
                     self.is_busy = True
-                    break
+                    return self.jobs.popleft()
                 self.is_busy = postman is None
-                wait_s = 0.0 if postman is None else postman.wait_s()
             if postman is None:
                 self.calls.get()
             else:
-                self._await(postman, wait_s)
-        if not self.inbox.empty():
-            self.alarm.put(None)
-        return self.jobs.popleft()
+                self._await(postman)
 
     def tell(self, event: Event) -> None:
         """Have an event of the trial's thread acted upon at once, without another thread."""
@@ -164,17 +158,21 @@ class Exchange:
             if self.postman is not None:
                 self.postman.take(event)
 
+    def _call(self, postman: Postman | None) -> None:
+        """Have the trial's thread look for a job, wherever it waits."""
+        self.calls.put(None)
+        if postman is not None:
+            postman.intake.wake()
+
     def _waits_for_trial(self) -> bool:
         return isinstance(self.jobs[0], Run)
 
-    def _await(self, postman: Postman, wait_s: float) -> None:
-        try:
-            item = self.inbox.get(timeout=wait_s)
-        except Empty:
-            item = Tick()
-        with self.lock:
-            if self.postman is postman:
-                postman.take(item)
+    def _await(self, postman: Postman) -> None:
+        item = postman.intake.take()
+        if item is not None:
+            with self.lock:
+                if self.postman is postman:
+                    postman.take(item)
 
 
 class Postman:
@@ -198,6 +196,7 @@ class Postman:
         self._mailbox = mailbox
         self._others: set[str] = set()
         self._end: End | None = None
+        self.intake = link.intake(keys.to_evaluator(name), keys.wake(name))
 
     def serve(self, epoch: int) -> End:
         """Take part in the run until it, or this process, ends.
@@ -206,8 +205,7 @@ class Postman:
             epoch: Of the learner that was discovered.
         """
         exchange = self._exchange
-        for pattern in self._keys.to_evaluator(self._name):
-            self._link.subscribe(pattern, exchange)
+        self._link.subscribe(self._keys.all_cmd(), exchange)
         self._link.watch(ANY_LEARNER, exchange)
         # Last: whoever sees the token may expect everything else to work.
         boot = self._mailbox.hello.boot
@@ -225,31 +223,30 @@ class Postman:
         return self._end
 
     def _relieve(self) -> float | None:
-        """Serve if the trial's thread is busy; say when to look again [s], nothing at the end."""
-        with self._exchange.lock:
-            if self._exchange.is_busy:
-                self.clear()
-                self.take(Tick())
+        """Do what is due; say when to look again [s], nothing at the end."""
+        exchange = self._exchange
+        with exchange.lock:
+            if exchange.is_busy:
+                self.clear()  # first: what came during a trial is renewed with it
+            while not exchange.inbox.empty():
+                self.take(exchange.inbox.get_nowait())
+            self.take(Tick())
             if self._end is not None:
                 return None
-            # While the other thread serves, it may become busy at any time without a sound.
-            return min(self.wait_s(), LOOK_LEASES * self._exchange.lease_s)
-
-    def wait_s(self) -> float:
-        """Return how long nothing need be done unless something comes [s]."""
-        return self._mailbox.wait_s(time.monotonic())
+            # The trial's thread becomes busy without a sound.
+            wait_s = min(self._mailbox.wait_s(time.monotonic()), LOOK_LEASES * exchange.lease_s)
+            is_called = not exchange.is_busy and bool(exchange.jobs)
+        if is_called:
+            self.intake.wake()
+        return wait_s
 
     def clear(self) -> None:
-        """Take all that is in the inbox. The caller holds the lock."""
-        inbox = self._exchange.inbox
-        while not inbox.empty():
-            try:
-                self.take(inbox.get_nowait())
-            except Empty:
-                return
+        """Take all that is in the intake. The caller holds the lock."""
+        while (item := self.intake.take_nowait()) is not None:
+            self.take(item)
 
     def take(self, item: object) -> None:
-        """Act upon one item from the inbox. The caller holds the lock."""
+        """Act upon one item from the intake or inbox. The caller holds the lock."""
         event = self._read(item)
         if event is not None and self._end is None:
             self._do(event)
@@ -257,13 +254,13 @@ class Postman:
             self._do(Leave(0, f"run {min(self._others)} has begun instead"))
 
     def _read(self, item: object) -> Event | None:
-        """Turn one item from the inbox into an event, if it is one."""
+        """Turn one item into an event, if it is one."""
         match item:
             case Arrival():
                 return self._hear(item)
             case Presence():
                 return self._see(item)
-            case TraceData():
+            case TraceData() | SceneData():
                 self._show(item)
                 return None
         return item  # type: ignore[return-value]  # the trial's thread puts in events only
@@ -294,12 +291,12 @@ class Postman:
             self._others.discard(address.run)
         return Tick()
 
-    def _show(self, trace: TraceData) -> None:
-        """Offer a trace to observers; nobody waits for one that is slow."""
+    def _show(self, message: TraceData | SceneData) -> None:
+        """Offer a trace or a scene to observers; nobody waits for one that is slow."""
         try:
-            self._link.observe(self._keys.obs(trace, self._name), encode(trace))
+            self._link.observe(self._keys.obs(message, self._name), encode(message))
         except ValueError as fault:
-            log.warning("the trace of trial %d is not shown: %s", trace.trial, fault)
+            log.warning("a %s is not shown: %s", type(message).__name__, fault)
 
     def _do(self, event: Event) -> None:
         """Have one event decided and carry out what follows; note the end, if it is one."""

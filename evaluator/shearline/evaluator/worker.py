@@ -19,12 +19,13 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from shearline.evaluator.base import Task, TrialAborted
+from shearline.evaluator.base import Task, Trace, TrialAborted
 from shearline.evaluator.builtin import builtin_task
-from shearline.evaluator.local import Verdict, run_trial, trace_data
+from shearline.evaluator.local import Verdict, run_trial
 from shearline.evaluator.mail import Beat, Ended, Prepare, Ready, Run, Started
 from shearline.evaluator.mailbox import RENEW_LEASES, Mailbox
 from shearline.evaluator.postman import End, Exchange, Postman
+from shearline.evaluator.showing import TRACE_HZ, Showing
 from shearline.evaluator.tasks import FunctionTask
 from shearline.protocol.errors import ConfigError, LinkError
 from shearline.protocol.keys import Keys, check_name
@@ -46,6 +47,9 @@ log = logging.getLogger(__name__)
 
 #: How long the trial's thread may take to hear that it is over [s].
 FAREWELL_S = 0.3
+
+#: Trials that follow each other faster than this share one line of the log [s].
+LOG_EVERY_S = 0.02
 
 #: Longest wait for a session to close [s].
 CLOSE_S = 0.5
@@ -73,6 +77,7 @@ class WorkerConfig:
         wait_s: How long to wait for a learner at the start [s], ``None`` for ever.
         forever: Wait for the next run when one ends.
         traces: Offer each trial's trace to observers.
+        trace_hz: Samples of a trace per second of the trial's clock, at most.
         settings: Further Zenoh settings by path (TLS).
     """
 
@@ -83,6 +88,7 @@ class WorkerConfig:
     wait_s: float | None = 10.0
     forever: bool = False
     traces: bool = True
+    trace_hz: float = TRACE_HZ
     settings: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -124,11 +130,14 @@ class Worker:
         self._boot = secrets.token_hex(8)
         self._engine = ""
         self._space: Space | None = None
+        self._showing = Showing(config.trace_hz)
         self._warm = False
         self._over: set[tuple[str, int]] = set()
         self._parted = threading.Event()
         self._beat_s = 0.0
         self._deadline_s = 0.0
+        self._log_s = 0.0
+        self._unsaid = 0
 
     def run(self) -> End:
         """Run trials until the end."""
@@ -198,12 +207,31 @@ class Worker:
             self._deadline_s = time.monotonic() + trial.deadline_s
             verdict = run_trial(self._task, trial.theta, trial.seed, self._beat, self._space)
         exchange.tell(Ended(self._result(trial, verdict)))
-        log.info("trial %d: %s %.6g %s", trial.trial, verdict.kind, verdict.cost, verdict.why)
+        self._log(trial, verdict)
         if self._config.traces and verdict.trace is not None:
-            try:
-                exchange.put(trace_data(verdict.trace, trial.trial, trial.token))
-            except ValueError as fault:
-                log.warning("the trace of trial %d is malformed: %s", trial.trial, fault)
+            self._show(verdict.trace, trial)
+
+    def _show(self, trace: Trace, trial: Trial) -> None:
+        """Offer what happened to observers; what they miss is no concern of the trial's."""
+        now_s = time.monotonic()
+        try:
+            for message in self._showing.messages(
+                self._task, trace, trial.trial, trial.token, now_s
+            ):
+                self.exchange.put(message)
+        except ValueError as fault:
+            log.warning("the trace of trial %d is malformed: %s", trial.trial, fault)
+
+    def _log(self, trial: Trial, verdict: Verdict) -> None:
+        """Write a line for a trial, but not for each of thousands a second."""
+        self._unsaid += 1
+        now_s = time.monotonic()
+        if now_s < self._log_s:
+            return
+        among = f" (one of {self._unsaid})" if self._unsaid > 1 else ""
+        self._unsaid, self._log_s = 0, now_s + LOG_EVERY_S
+        text = "trial %d: %s %.6g %s%s"
+        log.info(text, trial.trial, verdict.kind, verdict.cost, verdict.why, among)
 
     def _beat(self) -> None:
         """Renew the leases now and then; end the trial if it has to end."""

@@ -26,6 +26,9 @@ UP_TOPICS = ("hello", "credit", "renew", "result", "bye")
 #: What is said to one evaluator; welcomes, refusals and commands share ``cmd``.
 DOWN_TOPICS = ("trial", "ack", "cmd")
 
+#: Stands where an evaluator's name would; none can have it.
+NOBODY = "-"
+
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _CHUNK = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 
@@ -109,17 +112,24 @@ class Keys:
         """Return the liveliness key of one life of the learner."""
         return f"{self.root}/live/learner/{epoch}"
 
-    def from_evaluators(self) -> tuple[str, ...]:
-        """Return the patterns that the learner listens to.
+    def from_evaluators(self) -> str:
+        """Return the pattern that the learner listens to.
 
-        One pattern for all topics: what comes on one subscription comes in order, while two may
-        overtake each other.
+        One for all topics: what comes on one subscription comes in order, while two may overtake
+        each other.
         """
-        return (f"{self.root}/ev/*/*",)
+        return f"{self.root}/ev/*/*"
 
-    def to_evaluator(self, evaluator: str) -> tuple[str, ...]:
-        """Return the patterns that one evaluator listens to."""
-        return (f"{self.root}/ev/{evaluator}/*", self.all_cmd())
+    def to_evaluator(self, evaluator: str) -> str:
+        """Return the pattern that one evaluator listens to, beside :meth:`all_cmd`."""
+        return f"{self.root}/ev/{evaluator}/*"
+
+    def wake(self, evaluator: str = NOBODY) -> str:
+        """Return the key on which a process wakes its own waiting thread; it leaves no session.
+
+        The learner's own is that of no evaluator.
+        """
+        return f"{self.root}/ev/{evaluator}/wake"
 
     def observed(self) -> str:
         """Return the pattern of everything an observer may hear."""

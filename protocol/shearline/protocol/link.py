@@ -13,7 +13,6 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol, Self
@@ -27,6 +26,7 @@ from shearline.protocol.endpoints import (
     why_not_listening,
 )
 from shearline.protocol.errors import LinkError
+from shearline.protocol.intake import Arrival, Intake, Presence
 from shearline.protocol.keys import ANY_LEARNER, parse
 
 if TYPE_CHECKING:
@@ -41,6 +41,10 @@ SESSIONS_MAX = 4096
 #: Keys whose way is remembered: three for each evaluator that a learner admits, and some. Names
 #: that never come back must not fill the memory.
 PUBLISHERS_MAX = 4 * SESSIONS_MAX
+
+#: Messages that wait in an intake before their senders are slowed down: more than evaluators ever
+#: have on their way honestly, and bounded memory whatever they send.
+INTAKE_MAX = 1024
 
 #: Longest single attempt to connect, so that Ctrl-C and a deadline are noticed in between [s].
 _SLICE_S = 0.5
@@ -66,22 +70,6 @@ _COMMON: Mapping[str, object] = {
 }
 
 _open_links: WeakSet[Link] = WeakSet()
-
-
-@dataclass(frozen=True, slots=True)
-class Arrival:
-    """Bytes that came in on a key."""
-
-    key: str
-    payload: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class Presence:
-    """A liveliness token appeared (``alive``) or vanished."""
-
-    key: str
-    alive: bool
 
 
 class Sink(Protocol):
@@ -110,10 +98,11 @@ class Link:
         self._block = zenoh.CongestionControl.BLOCK
         self._drop = zenoh.CongestionControl.DROP
         self._put = zenoh.SampleKind.PUT
+        self._usual = zenoh.Priority.DATA
         self._low = zenoh.Priority.DATA_LOW
         self._remote = zenoh.Locality.REMOTE
         self._declared: list[Any] = []
-        self._publishers: dict[tuple[str, bool], Any] = {}
+        self._publishers: dict[tuple[str, bool | None], Any] = {}
         self._closed = False
         _open_links.add(self)
         _guard_exit()
@@ -128,21 +117,38 @@ class Link:
         """
         publisher = self._publishers.get((key, wait))
         if publisher is None:
-            publisher = self._publisher(key, wait=wait)
+            publisher = self._publisher(key, wait)
         publisher.put(payload)
 
-    def _publisher(self, key: str, *, wait: bool) -> Any:
-        """Declare a key: Zenoh then remembers the way, which it else seeks at each put."""
+    def _publisher(self, key: str, wait: bool | None) -> Any:  # noqa: FBT001 - one of three ways
+        """Declare a key: Zenoh then remembers the way, which it else seeks at each put.
+
+        Args:
+            key: Where.
+            wait: Block, drop, or ``None``: drop and stand behind everything else.
+        """
         if len(self._publishers) >= PUBLISHERS_MAX:
             self._publishers = {}  # they undeclare themselves once nobody uses them
-        control = self._block if wait else self._drop
-        publisher = self._session.declare_publisher(key, congestion_control=control)
+        publisher = self._session.declare_publisher(
+            key,
+            congestion_control=self._block if wait else self._drop,
+            priority=self._low if wait is None else self._usual,
+            allowed_destination=self._remote,
+        )
         self._publishers[key, wait] = publisher
         return publisher
 
     def observe(self, key: str, payload: bytes) -> None:
         """Send bytes that may be dropped, overtake nothing and never make the sender wait."""
-        self._session.put(key, payload, congestion_control=self._drop, priority=self._low)
+        self._observed(key).put(payload)
+
+    def is_observed(self, key: str) -> bool:
+        """Tell whether anyone listens at the moment: what nobody hears need not be made."""
+        return bool(self._observed(key).matching_status.matching)
+
+    def _observed(self, key: str) -> Any:
+        publisher = self._publishers.get((key, None))
+        return self._publisher(key, None) if publisher is None else publisher
 
     def subscribe(self, pattern: str, inbox: Sink) -> None:
         """Put an :class:`Arrival` into ``inbox`` for everything that others send on a pattern.
@@ -155,6 +161,28 @@ class Link:
 
         self._declared.append(
             self._session.declare_subscriber(pattern, enqueue, allowed_origin=self._remote)
+        )
+
+    def intake(self, pattern: str, waker: str) -> Intake:
+        """Return a queue of everything that others send on a pattern, for one thread to wait at.
+
+        Args:
+            pattern: What to hear.
+            waker: A key that matches the pattern and that nobody else uses.
+        """
+        import zenoh  # noqa: PLC0415 - as above
+
+        subscriber = self._session.declare_subscriber(
+            pattern, zenoh.handlers.FifoChannel(INTAKE_MAX)
+        )
+        self._declared.append(subscriber)
+        return Intake(
+            subscriber,
+            self._session.declare_publisher(
+                waker,
+                congestion_control=self._block,
+                allowed_destination=zenoh.Locality.SESSION_LOCAL,
+            ),
         )
 
     def watch(self, pattern: str, inbox: Sink) -> None:

@@ -194,7 +194,15 @@ class Refused(Message, frozen=True, kw_only=True, tag="refused"):
 
 
 class Trial(Message, frozen=True, kw_only=True, tag="trial"):
-    """One attempt, handed to one evaluator."""
+    """One attempt, handed to one evaluator.
+
+    Attributes:
+        theta: The tuple, in task units.
+        lease_s: It is given to another unless renewed within this time [s].
+        deadline_s: It counts as hung when it runs longer [s].
+        counted: Tokens of results of this boot that were counted: the :class:`Ack` of each, without
+            a message of its own.
+    """
 
     boot: Token
     epoch: Count
@@ -206,6 +214,7 @@ class Trial(Message, frozen=True, kw_only=True, tag="trial"):
     seed: Seed
     lease_s: Seconds
     deadline_s: Seconds
+    counted: Annotated[list[Token], Meta(max_length=1024)] = []
 
 
 class Ack(Message, frozen=True, kw_only=True, tag="ack"):
@@ -360,6 +369,7 @@ class TraceData(Message, frozen=True, kw_only=True, tag="trace"):
         units: One for each column.
         data: ``samples * len(names)`` float32, column after column.
         events: ``(t_s, name)`` of phase changes.
+        placed: Bodies whose place is this trial's own.
     """
 
     trial: Count
@@ -369,7 +379,7 @@ class TraceData(Message, frozen=True, kw_only=True, tag="trace"):
     units: Annotated[list[str], Meta(max_length=256)]
     data: bytes
     events: Annotated[list[tuple[float, str]], Meta(max_length=256)] = []
-        placed: Bodies whose place is this trial's own.
+    placed: Annotated[list[Placed], Meta(max_length=256)] = []
 
     def __post_init__(self) -> None:
         """Refuse columns that do not fit together (msgspec turns this into its own error)."""
@@ -379,7 +389,6 @@ class TraceData(Message, frozen=True, kw_only=True, tag="trace"):
                 f"expected a unit for each of {len(self.names)} names and {size} bytes,"
                 f" got {len(self.units)} units and {len(self.data)} bytes"
             )
-    placed: Annotated[list[Placed], Meta(max_length=256)] = []
 
 
 class Wire(Message, frozen=True, kw_only=True, tag="wire"):
@@ -393,7 +402,7 @@ class Wire(Message, frozen=True, kw_only=True, tag="wire"):
 
 def clip(text: str, chars: int = TEXT_CHARS_MAX) -> str:
     """Return text that any message may carry: no lone surrogates, not too long."""
-    return text.encode("utf-8", "replace").decode()[:chars]
+    return text[:chars] if text.isascii() else text.encode("utf-8", "replace").decode()[:chars]
 
 
 def digest(task: TaskSpec) -> str:

@@ -12,7 +12,7 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from shearline.protocol.link import Arrival, Presence
+from shearline.protocol.intake import Arrival, Presence
 
 #: Some seconds of ten simulators at full rate; the recorder's memory stays near this.
 BULK_BYTES_MAX = 64 * 2**20

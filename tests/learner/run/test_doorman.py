@@ -22,8 +22,8 @@ from shearline.learner.run.doorman import (
     is_oversized,
 )
 from shearline.protocol.codec import CONTROL_BYTES_MAX, encode
+from shearline.protocol.intake import Arrival, Presence
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import Arrival, Presence
 from shearline.protocol.messages import (
     VERSION,
     Bye,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import signal
 from collections.abc import Mapping
-from queue import Empty
+from queue import Empty, SimpleQueue
 from typing import Any
 
 import numpy as np
@@ -23,11 +23,10 @@ from shearline.learner.dispatcher.events import (
 from shearline.learner.dispatcher.instructions import Ask
 from shearline.learner.random_search import RandomSearch
 from shearline.learner.run.fitter import Fitter, Recommended, model_json
-from shearline.learner.run.inbox import Inbox
 from shearline.learner.run.incoming import COMPLAINTS_MAX, Incoming
 from shearline.learner.run.seeds import trial_seed
 from shearline.learner.run.signals import Hurry, signals_to
-from shearline.protocol.link import Arrival, Presence
+from shearline.protocol.intake import Arrival, Presence
 from shearline.protocol.messages import CommandKind
 
 SPACE = Space({"x": ("", 0.0, 1.0)})
@@ -57,7 +56,7 @@ class Odd(RandomSearch):
 
 def answers(learner: Any, ask: Ask, book: Book | None = None) -> list[Any]:
     """Return everything the fitter puts in until its last word."""
-    box = Inbox()
+    box = SimpleQueue[Any]()
     fitter = Fitter(learner, 3, box)
     fitter.start(book or Book())
     fitter.ask(ask)
@@ -109,7 +108,7 @@ def test_a_model_becomes_json_whatever_is_in_it() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_first_signal_stops_and_the_second_hurries(number: signal.Signals) -> None:
-    box = Inbox()
+    box = SimpleQueue[Any]()
     before = signal.getsignal(number)
     with signals_to(box):
         signal.raise_signal(number)

@@ -25,8 +25,9 @@ from shearline.learner.run.summary import RunSummary
 from shearline.protocol.codec import TO_OBSERVER, decode, encode
 from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import ConfigError, LinkError, RecordError, ShearlineError
+from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import Arrival, discover, open_client, open_router
+from shearline.protocol.link import discover, open_client, open_router
 from shearline.protocol.messages import (
     Command,
     CommandKind,
@@ -148,7 +149,8 @@ def test_observers_hear_everything(tmp_path: Path, endpoint: str) -> None:
     assert len(kinds[EpisodeClosed]) == 3
     assert len(kinds[Proposed]) >= 10
     assert len(kinds[Snapshot]) >= 2
-    assert len(kinds[Wire]) >= 45  # a trial, a result and an acknowledgement each
+    # A trial and a result each; most acknowledgements travel with a trial.
+    assert len(kinds[Wire]) >= 30
     assert isinstance(messages[-1], Status)
     assert messages[-1].state == statuses[-1].state == "ended"
     assert statuses[-1].counted == 15

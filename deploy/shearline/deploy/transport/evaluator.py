@@ -22,8 +22,9 @@ from shearline.evaluator.mail import Ended, Event, Heard, LearnerAlive, Quit, Ru
 from shearline.evaluator.mailbox import Mailbox
 from shearline.evaluator.worker import WorkerConfig, run_worker
 from shearline.protocol.codec import BY_TOPIC, decode, encode
+from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys, parse
-from shearline.protocol.link import Arrival, Link, open_client
+from shearline.protocol.link import Link, open_client
 from shearline.protocol.messages import VERSION, Hello, Result, Trial, digest
 
 #: How often the timers of light evaluators are looked at [s]; they are set in quarters of seconds.
@@ -102,10 +103,9 @@ def _join(endpoint: str, run: str, name: str, inbox: SimpleQueue[Any], *, is_fir
     """Connect and say hello."""
     link, keys = open_client(endpoint), Keys(run)
     boot = f"boot-of-{name}"
-    own, to_all = keys.to_evaluator(name)
-    link.subscribe(own, inbox)
+    link.subscribe(keys.to_evaluator(name), inbox)
     if is_first:  # what is said to all is heard once in this process, and passed on
-        link.subscribe(to_all, inbox)
+        link.subscribe(keys.all_cmd(), inbox)
     link.announce(keys.live_evaluator(name, boot))
     hello = Hello(
         boot=boot,

@@ -152,13 +152,15 @@ class Bench:
         Args:
             joining: Called once evaluators may join.
         """
-        keys, inbox = Keys(self.run_dir.name), Inbox()
+        keys = Keys(self.run_dir.name)
         with (
             quick_switching(),
             Folder(self.run_dir, self.config) as folder,
             logged_to(self.run_dir / "learner.log"),
             open_router(self.endpoint) as link,
         ):
+            intake = link.intake(keys.from_evaluators(), keys.wake())
+            inbox = Inbox(intake)
             owner = Owner(
                 self.config,
                 keys.run,
@@ -169,12 +171,11 @@ class Bench:
                 inbox,
             )
             epoch = owner.begin()
-            for pattern in keys.from_evaluators():
-                link.subscribe(pattern, inbox)
             link.watch(keys.live_evaluators(), inbox)
             link.announce(keys.live_learner(epoch))
             joining()
-            owner.run()
+            with intake.woken_every(owner.tick_s):
+                owner.run()
         return self.stopwatch.trips
 
     def _learner(self) -> Learner:

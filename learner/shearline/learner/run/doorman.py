@@ -15,7 +15,7 @@ from itertools import islice
 
 from shearline.learner.dispatcher.desk import Desk
 from shearline.protocol.codec import CONTROL_BYTES_MAX
-from shearline.protocol.link import Arrival, Presence
+from shearline.protocol.intake import Arrival, Presence
 
 #: Longer keys are of nobody: a run and an evaluator have at most 64 characters each.
 KEY_CHARS_MAX = 256

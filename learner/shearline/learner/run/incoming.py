@@ -20,8 +20,8 @@ from shearline.learner.dispatcher.events import (
 )
 from shearline.protocol.codec import decode
 from shearline.protocol.errors import ProtocolError
+from shearline.protocol.intake import Arrival, Presence
 from shearline.protocol.keys import parse
-from shearline.protocol.link import Arrival, Presence
 from shearline.protocol.messages import Bye, Command, Credit, Hello, Message, Renew, Result
 
 #: Complaints about peers that are written out; the rest is only counted.

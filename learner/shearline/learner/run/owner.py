@@ -6,11 +6,12 @@ entries of the whole step in one go, and only then lets anyone know. It never wa
 
 from __future__ import annotations
 
+import gc
 import logging
+import math
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
-from queue import Empty
 
 from shearline.learner.base import Recommendation
 from shearline.learner.dispatcher import Dispatcher, status
@@ -34,19 +35,24 @@ from shearline.learner.run.fitter import Fitter, Modelled, Recommended
 from shearline.learner.run.inbox import Inbox
 from shearline.learner.run.incoming import Incoming
 from shearline.learner.run.journal import Journal as JournalFile
-from shearline.learner.run.outgoing import Outgoing
+from shearline.learner.run.outgoing import Outgoing, together
 from shearline.learner.run.pulse import Pulse
 from shearline.learner.run.signals import Hurry
-from shearline.protocol.link import Arrival, Presence
+from shearline.protocol.intake import Arrival, Presence
 from shearline.protocol.messages import Snapshot, Status
-
-#: Items taken in one step: one write for all of them, and a bound on how long a step takes.
-STEP_ITEMS_MAX = 32
 
 STATUS_EVERY_S = 0.5
 
-#: No step may cost more, whatever evaluators do; one that does is logged [s].
+#: No step may cost more processor time, whatever evaluators do; one that does is logged [s].
 STEP_CPU_S_MAX = 0.05
+
+#: Once a step has cost so much it decides about nothing further, and once so much, it lets
+#: observers wait for the next one [s].
+STEP_DECIDES_S = 0.01
+STEP_TELLS_S = 0.02
+
+#: Observers are told so much in any step, so that what they wait for does not grow.
+TELLS_MIN = 64
 
 #: How long the end waits for evaluators to leave, and for the learner's last word [s].
 LINGER_S = 2.0
@@ -75,6 +81,7 @@ class Owner:
         recommendation: The learner's last word.
         ending: How the run ended, and
         why: why, if not by completing.
+        tick_s: How often it has to be woken at least [s].
     """
 
     def __init__(
@@ -101,7 +108,9 @@ class Owner:
         self._on_status = on_status
         self._incoming = Incoming()
         self._pulse = Pulse()
-        self._tick_s = min(config.lease_s / 8, 0.1)
+        self._left: list[object] = []
+        self._news: deque[Instruction] = deque()
+        self.tick_s = min(config.lease_s / 8, 0.1)
         # Reads like the epoch, but neither jumps nor goes back while the process lives.
         self._zero_s = time.time() - time.monotonic()
         self._next_tick_s = self._next_status_s = 0.0
@@ -121,19 +130,25 @@ class Owner:
             RecordError: If the journal cannot be written; nothing unwritten was told to anyone.
         """
         while not self._is_over():
-            items = self._take()
-            began_s, began_cpu_s = time.perf_counter(), time.thread_time()
+            began_cpu_s = time.thread_time()
+            items = self._left or self._inbox.take()
+            began_s, self._left = time.perf_counter(), []
             out: list[Instruction] = []
-            for item in items:
+            for number, item in enumerate(items, start=1):
                 if isinstance(item, Hurry):
                     return
                 event = self._event(item)
                 if event is not None:
                     out += self.dispatcher.handle(event, self._now_s())
+                if time.thread_time() - began_cpu_s > STEP_DECIDES_S:
+                    self._left = items[number:]
+                    break
             if self._now_s() >= self._next_tick_s:
-                self._next_tick_s = self._now_s() + self._tick_s
+                # Who is woken just before the time need not wait for the next waking.
+                self._next_tick_s = self._now_s() + 0.9 * self.tick_s
                 out += self.dispatcher.handle(Tick(), self._now_s())
             self._carry_out(out)
+            self._tell(began_cpu_s + STEP_TELLS_S)
             if self._now_s() >= self._next_status_s:
                 self._show()
             cpu_s = time.thread_time() - began_cpu_s
@@ -141,6 +156,7 @@ class Owner:
             if cpu_s > STEP_CPU_S_MAX:
                 kinds = Counter(type(item).__name__ for item in items)
                 _log.warning("a step took %.0f ms of processor time: %s", 1e3 * cpu_s, dict(kinds))
+        self._tell(math.inf)
         self._show()
         vitals = self.vitals()
         _log.info(
@@ -172,17 +188,6 @@ class Owner:
     def _now_s(self) -> float:
         return self._zero_s + time.monotonic()
 
-    def _take(self) -> list[object]:
-        """Wait for something to do until the next tick, then take what else is there."""
-        items: list[object] = []
-        try:
-            items.append(self._inbox.get(timeout=max(self._next_tick_s - self._now_s(), 0.0005)))
-            while len(items) < STEP_ITEMS_MAX:
-                items.append(self._inbox.get_nowait())
-        except Empty:
-            pass
-        return items
-
     def _event(self, item: object) -> Event | None:
         if isinstance(item, Event):
             return item
@@ -210,17 +215,23 @@ class Owner:
         if entries:
             self._journal.append(entries, sync=any(isinstance(e, _DEAR) for e in entries))
         # Evaluators wait for what is said to them; observers and the log do not.
-        for instruction in out:
-            if not isinstance(instruction, Publish | Say):
-                self._effect(instruction)
+        for send in together([i for i in out if isinstance(i, Send)]):
+            self._outgoing.send(send.evaluator, send.message, self._now_s())
         for instruction in out:
             if isinstance(instruction, Publish | Say):
+                self._news.append(instruction)
+            else:
                 self._effect(instruction)
+
+    def _tell(self, until_cpu_s: float) -> None:
+        """Let observers and the log know, in order; no further once the step has cost enough."""
+        told = 0
+        while self._news and (told < TELLS_MIN or time.thread_time() < until_cpu_s):
+            self._effect(self._news.popleft())
+            told += 1
 
     def _effect(self, instruction: Instruction) -> None:
         match instruction:
-            case Send(evaluator, message):
-                self._outgoing.send(evaluator, message, self._now_s())
             case Publish(message):
                 self._outgoing.publish(message)
             case Broadcast(message):
@@ -230,6 +241,10 @@ class Owner:
             case Ask():
                 self._fitter.ask(instruction)
                 self._next_status_s = 0.0
+                # All that is known by now is kept to the end. Looking it through for rubbish, as
+                # Python does again and again, took 100 ms once there were 100 000 trials.
+                gc.collect(1)
+                gc.freeze()
             case EndRun(ending, why, tells):
                 self.ending, self.why = ending, why
                 self._end_by_s = self._now_s() + LINGER_S

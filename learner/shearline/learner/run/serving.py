@@ -75,14 +75,16 @@ def serve(
         if folder.damage():
             _log.warning("%s", folder.damage())
         dispatcher = Dispatcher(config.rules(), lambda: secrets.token_hex(TOKEN_BYTES), folder.book)
-        inbox = Inbox(Doorman(dispatcher.desk))
-        with open_router(listen, settings=settings) as link, signals_to(inbox), quick_switching():
+        with open_router(listen, settings=settings) as link:
+            intake = link.intake(keys.from_evaluators(), keys.wake())
+            inbox = Inbox(intake, Doorman(dispatcher.desk))
             owner = _owner(config, folder, keys, dispatcher, link, inbox, on_status)
-            epoch = owner.begin()
-            _listen(link, keys, inbox, epoch)
-            if on_listening is not None:
-                on_listening()
-            owner.run()
+            with signals_to(inbox), quick_switching(), intake.woken_every(owner.tick_s):
+                epoch = owner.begin()
+                _listen(link, keys, inbox, epoch)
+                if on_listening is not None:
+                    on_listening()
+                owner.run()
         summary = summarise(
             config,
             owner.dispatcher.desk,
@@ -129,7 +131,6 @@ def _owner(
 
 def _listen(link: Link, keys: Keys, inbox: Inbox, epoch: int) -> None:
     """Hear evaluators and operator; say last that the learner is there."""
-    for pattern in (*keys.from_evaluators(), keys.op_cmd()):
-        link.subscribe(pattern, inbox)
+    link.subscribe(keys.op_cmd(), inbox)
     link.watch(keys.live_evaluators(), inbox)
     link.announce(keys.live_learner(epoch))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import FrameType
 
 from shearline.learner.dispatcher.events import OperatorCommand
-from shearline.learner.run.inbox import Inbox
+from shearline.protocol.link import Sink
 from shearline.protocol.messages import CommandKind
 
 _CAUGHT = (signal.SIGINT, signal.SIGTERM)
@@ -22,7 +22,7 @@ class Hurry:
 
 
 @contextmanager
-def signals_to(inbox: Inbox) -> Iterator[None]:
+def signals_to(inbox: Sink) -> Iterator[None]:
     """Put a stop into the inbox at the first SIGINT or SIGTERM, and :class:`Hurry` after it.
 
     Only the main thread hears signals; in any other this does nothing.
