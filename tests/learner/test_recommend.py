@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from math import isnan
+import math
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_what_is_said_is_consistent(count: int, data: st.DataObject) -> None:
     answer = recommendation(SPACE, trials, MIDDLE)
     low, high = answer.interval
     assert 0.0 <= low <= answer.success_probability <= high <= 1.0
-    assert isnan(answer.cost) == (not trials.last(ON_POLICY_TRIALS).success.any())
+    assert math.isnan(answer.cost) == (not trials.last(ON_POLICY_TRIALS).success.any())
 
 
 def test_the_claim_rests_on_the_latest_trials_alone() -> None:
@@ -85,27 +85,37 @@ def test_a_region_is_held_to_trials_as_far_out_as_its_own_draws(
         assert np.sqrt(np.mean(one_more**2)) < reach
 
 
-def test_where_all_succeed_the_region_has_the_spread_of_the_policy() -> None:
-    trials = trials_around(60, 60)
-    region = recommendation(SPACE, trials, MIDDLE).region
-    assert region is not None
-    draws = SPACE.normalise(region.sample(np.random.default_rng(0), 4000))
-    np.testing.assert_allclose(draws.std(axis=0), MIDDLE.scale, rtol=0.05)
-    assert region.trials == region.successes
-    shared_out = 1 - 0.05 / len(REACHES)
-    assert region.success_low == clopper_pearson_low(region.trials, region.trials, shared_out)
+def test_where_all_succeed_the_region_has_the_spread_of_the_trials() -> None:
+    rng = np.random.default_rng(1)
+    for narrower in (1.0, 0.05):
+        u = 0.5 + narrower * MIDDLE.scale * rng.standard_normal((60, 2))
+        trials = Trials(np.arange(60), u, np.full(60, 0.5), np.ones(60, dtype=np.bool_))
+        region = recommendation(SPACE, trials, MIDDLE).region
+        assert region is not None
+        draws = SPACE.normalise(region.sample(np.random.default_rng(0), 4000))
+        np.testing.assert_allclose(draws.std(axis=0), narrower * MIDDLE.scale, rtol=0.5)
+        assert region.trials == region.successes > 30
+        shared_out = 1 - 0.05 / len(REACHES)
+        assert region.success_low == clopper_pearson_low(region.trials, region.trials, shared_out)
 
 
 def test_where_only_the_inside_succeeds_the_region_is_small() -> None:
     rng = np.random.default_rng(1)
     u = 0.5 + MIDDLE.scale * rng.standard_normal((60, 2))
-    success = MIDDLE.distance(u) < 1.0
+    distance = MIDDLE.distance(u)
+    success = distance < 1.0
     trials = Trials(np.arange(60), u, np.where(success, 0.5, 14.8), success)
     region = recommendation(SPACE, trials, MIDDLE).region
     assert region is not None
-    widest = 2.0 * MIDDLE.scale * np.array([10.0, 2.0])
-    np.testing.assert_allclose(region.radius, REACHES[0] * widest)
+    smallest = REACHES[0] * np.median(distance) * math.sqrt(2)
+    np.testing.assert_allclose(region.radius, smallest * MIDDLE.scale * np.array([10.0, 2.0]))
     assert region.success_low > recommendation(SPACE, trials, MIDDLE).interval[0]
+
+
+def test_one_tuple_tried_again_and_again_makes_no_region() -> None:
+    u = np.tile(MIDDLE.centre, (60, 1))
+    trials = Trials(np.arange(60), u, np.full(60, 0.5), np.ones(60, dtype=np.bool_))
+    assert recommendation(SPACE, trials, MIDDLE).region is None
 
 
 @given(wins=st.integers(2, 60), seed=st.integers(0, 20))

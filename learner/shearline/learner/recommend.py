@@ -24,7 +24,7 @@ from shearline.protocol.space import Space
 ON_POLICY_TRIALS = 60
 #: Share of the recent successes, nearest first, that the expected cost rests on.
 NEAR_SHARE = 0.75
-#: Sizes of regions that are weighed, in multiples of the policy's own spread.
+#: Sizes of regions that are weighed, in multiples of how far out a recent trial typically lies.
 REACHES = (0.5, 1.0, 2.0)
 #: Trials farther out than so many reaches say nothing about a region.
 NEIGHBOURHOOD = 2.0
@@ -114,11 +114,12 @@ def _expected_cost(recent: Trials, focus: Focus) -> float:
 def claimed_region(space: Space, recent: Trials, focus: Focus) -> Region | None:
     """Return the largest ellipsoid whose success is about as well supported as that of any.
 
-    Ellipsoids of a few fixed sizes are each held to recent trials that lie, on average, as far
-    out as draws from it do (:func:`_as_far_out`): if success does not rise with the distance from
-    the middle, draws succeed at least as often as those trials. The Clopper-Pearson bounds hold
-    for all sizes together, with the confidence shared out among them (Bonferroni), so that any
-    of them may be chosen: here the largest whose bound is within ``GIVE`` of the best.
+    A few sizes are weighed, which depend on where the recent trials lie and not on how they
+    ended. Each is held to those of them that lie, on average, as far out as draws from it do
+    (:func:`_as_far_out`): if success does not rise with the distance from the middle, draws
+    succeed at least as often. The Clopper-Pearson bounds hold for all sizes together, with the
+    confidence shared out among them (Bonferroni), so that any may be chosen: here the largest
+    whose bound is within ``GIVE`` of the best.
 
     ``None`` below two successes, and where no size has any support.
     """
@@ -126,10 +127,11 @@ def claimed_region(space: Space, recent: Trials, focus: Focus) -> Region | None:
         return None
     n = len(focus.scale)
     distance = focus.distance(recent.u) / math.sqrt(n)
-    held = [recent.success[_as_far_out(distance, reach)] for reach in REACHES]
+    reaches = np.multiply(REACHES, np.median(distance))
+    held = [recent.success[_as_far_out(distance, reach)] for reach in reaches]
     confidence = 1.0 - (1.0 - CONFIDENCE) / len(REACHES)
     lows = [clopper_pearson_low(int(won.sum()), len(won), confidence) for won in held]
-    if max(lows) == 0.0:
+    if reaches[0] == 0.0 or max(lows) == 0.0:
         return None
     best = max(k for k, low in enumerate(lows) if low >= GIVE * max(lows))
     return Region(
@@ -137,7 +139,7 @@ def claimed_region(space: Space, recent: Trials, focus: Focus) -> Region | None:
         centre=space.denormalise(np.clip(focus.centre, 0.0, 1.0)),
         # Uniform in an ellipsoid of half axes r, a draw has the standard deviations
         # r / sqrt(n + 2) and lies sqrt(n / (n + 2)) of the way out (root mean square).
-        radius=REACHES[best] * math.sqrt(n + 2) * focus.scale * (space.high - space.low),
+        radius=reaches[best] * math.sqrt(n + 2) * focus.scale * (space.high - space.low),
         success_low=lows[best],
         confidence=CONFIDENCE,
         trials=len(held[best]),
