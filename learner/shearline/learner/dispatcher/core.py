@@ -39,6 +39,9 @@ from shearline.protocol.messages import Command, CommandKind, Refused, Verdict
 #: Steps kept for a bug report: what came, when, and what was done about it.
 STORY_MAX = 1024
 
+#: Attempts given up in one tick: if half of a large crowd vanishes, the rest is for the next tick.
+LAPSES_MAX = 256
+
 
 class Dispatcher:
     """The state machine that hands a learner's trials to evaluators.
@@ -105,9 +108,10 @@ def _begin(desk: Desk, _event: Begin) -> None:
 def _tick(desk: Desk, _event: Tick) -> None:
     """Let time have its effects."""
     desk.count_crew()
-    for token, lease in list(desk.leases.items()):
-        if desk.clock_s > min(lease.until_s, lease.deadline_s):
-            _lapse_due(desk, token, overdue=desk.clock_s > lease.deadline_s)
+    clock_s = desk.clock_s
+    due = [t for t, lease in desk.leases.items() if clock_s > min(lease.until_s, lease.deadline_s)]
+    for token in due[:LAPSES_MAX]:
+        _lapse_due(desk, token, overdue=clock_s > desk.leases[token].deadline_s)
     if desk.state is not RunState.ENDED:
         episodes.settle(desk)
     handout.spread(desk)
