@@ -6,7 +6,7 @@ INSTALLED := $(VENV)/.installed
 # Branch coverage is a promise for the wire and the dispatcher; tracing everything costs a minute.
 COVERED := --cov=shearline.protocol --cov=shearline.learner.dispatcher
 
-.PHONY: help demo test lint types quick bench clean
+.PHONY: help demo test lint types quick chaos fuzz bench clean
 
 help:  ## say what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -42,6 +42,9 @@ quick: $(INSTALLED)  ## the quick suite alone
 
 chaos: $(INSTALLED)  ## hurt real processes for minutes, and print what it cost (docs/chaos.md)
 	$(BIN)/python -m pytest tests/chaos -m long -p no:randomly -s
+
+fuzz: $(INSTALLED)  ## spoil a million messages; none may do harm (docs/dispatcher.md)
+	PYTHONPATH=tests $(BIN)/python -m simulation.fuzz 1000000
 
 bench: $(INSTALLED)  ## side by side with the physical limit
 	$(BIN)/shearline bench sim
