@@ -37,6 +37,12 @@ def test_toml_reads_back_to_the_same_value_and_digest(
     assert digest(again.task) == digest(task)
 
 
+def test_a_learners_switches_are_kept_as_they_were_said() -> None:
+    switches = {"svm_c": 1e3, "labels": "previous", "tuples": [[0.5, 5.0], [1.0, 200.0]]}
+    config = RunConfig(task=TASK, switches=switches)
+    assert from_toml(to_toml(config)) == config
+
+
 def test_the_order_of_parameters_is_kept() -> None:
     assert list(from_toml(to_toml(CONFIG)).task.space) == ["push", "k_rot"]
     assert CONFIG.space.names == ("push", "k_rot")
@@ -82,6 +88,7 @@ def test_a_task_is_needed_and_its_space_checked() -> None:
         ({"seed": 1}, "its seed is 0, not 1"),
         ({"learner": "lhs"}, "its learner is 'psp', not 'lhs'"),
         ({"trials": 3}, "its trials is 20, not 3"),
+        ({"switches": {"svm_c": 1e3}}, "its learner has other switches (none)"),
         ({"task": TaskSpec(name="keylock", space={"x": ("", 0.0, 1.0)})}, "its task is 'keylock'"),
         ({"lease_s": 9.0, "record": False, "speculative": False}, ""),
     ],
