@@ -36,7 +36,8 @@ def charged(trials: Trials, failures: Failures = Failures.ALIKE) -> Array:
     if not len(won):
         return result if failures is Failures.ORDERED else np.zeros(len(trials))
     span = float(won.max() - won.min()) or max(1.0, abs(float(won.max())))
-    result[~trials.success] = won.max() + span
+    # Dearer than every success also where the span is lost in rounding.
+    result[~trials.success] = max(won.max() + span, np.nextafter(won.max(), np.inf))
     if failures is Failures.ORDERED and len(lost):
         reach = float(np.ptp(lost)) or 1.0
         result[~trials.success] += span * (lost - lost.min()) / reach

@@ -1,0 +1,167 @@
+"""CMA-ES as the package has it: the package alone is the oracle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cma  # type: ignore[import-untyped]  # it ships no type information
+import numpy as np
+import pytest
+
+from shearline.learner import Learner, Space, create
+from shearline.learner.base import Array
+from shearline.learner.cmaes import generations
+from shearline.learner.threads import fitting
+from shearline.sims.functions import shifted, sphere
+from shearline.studies.benchmark import benchmark
+
+BATCH = 12
+Cost = Callable[[Array], float]
+
+
+def bowl(u: Array) -> float:
+    return float(np.sum((u - 0.7) ** 2))
+
+
+def alone(n: int, seed: int, cost: Cost, batches: int, **options: object) -> list[Array]:
+    """Run the package by itself and return its generations ``(batch, n)``."""
+    rngs = iter([np.random.default_rng([seed, k]) for k in range(batches)])
+    rng = next(rngs)
+    strategy = cma.CMAEvolutionStrategy(
+        n * [0.5],
+        0.3,
+        {
+            "bounds": [0.0, 1.0],
+            "randn": lambda *shape: rng.standard_normal(shape),
+            "seed": np.nan,
+            "verbose": -9,
+            **options,
+        },
+    )
+    asked = []
+    with fitting():
+        for k in range(batches):
+            if k:
+                rng = next(rngs)
+            solutions = strategy.ask()
+            strategy.tell(solutions, [cost(x) for x in solutions])
+            asked.append(np.array(solutions))
+    return asked
+
+
+def batch(learner: Learner, cost: Cost) -> Array:
+    proposals = learner.ask(learner.episode_length)
+    for p in proposals:
+        learner.tell(p.trial, cost=cost(p.theta), success=True)
+    return np.array([p.theta for p in proposals])
+
+
+@pytest.mark.parametrize("n", [2, 5])
+def test_with_one_generation_an_episode_it_is_the_package_bit_for_bit(n: int) -> None:
+    learner = create("cmaes", Space.unit(n), BATCH, seed=3, population="episode")
+    for expected in alone(n, 3, bowl, 8, popsize=BATCH):
+        np.testing.assert_array_equal(batch(learner, bowl), expected)
+
+
+def test_with_the_penalty_handler_too() -> None:
+    learner = create("cmaes", Space.unit(3), BATCH, 3, population="episode", boundary="penalty")
+    for expected in alone(3, 3, bowl, 6, popsize=BATCH, BoundaryHandler=cma.BoundPenalty):
+        np.testing.assert_array_equal(batch(learner, bowl), expected)
+
+
+@pytest.mark.parametrize(("start", "spread"), [(0.5, 0.05), (0.1, 0.02)])
+def test_it_starts_where_it_is_told_to(start: float, spread: float) -> None:
+    learner = create("cmaes", Space.box(4, -5.0, 5.0), 200, seed=0, start=start, spread=spread)
+    first = np.array([p.theta for p in learner.ask(200)])
+    assert first.mean(axis=0) == pytest.approx(10.0 * start - 5.0, abs=2.5 * spread)
+    assert first.std(axis=0) == pytest.approx(10.0 * spread, rel=0.2)
+
+
+@pytest.mark.parametrize("count", range(1, 60))
+def test_generations_share_out_all_outcomes_in_whole_populations(count: int) -> None:
+    found = generations(count, 12)
+    assert [k for first, beyond in found for k in range(first, beyond)] == list(range(count))
+    sizes = [beyond - first for first, beyond in found]
+    assert all(size == 12 for size in sizes[:-1])
+    assert sizes[-1] < 24
+    assert sizes[-1] >= min(12, count)
+
+
+def test_an_episode_with_some_missing_still_teaches() -> None:
+    learner = create("cmaes", Space.unit(4), BATCH, seed=0)
+    for _ in range(15):
+        for p in learner.ask(BATCH):
+            if p.trial % 4:
+                learner.tell(p.trial, cost=bowl(p.theta), success=True)
+    assert learner.recommend().theta == pytest.approx(0.7, abs=0.1)
+
+
+def test_too_few_outcomes_wait_for_more() -> None:
+    learner = create("cmaes", Space.unit(4), 1, seed=0)
+    before = learner.snapshot()["mixture"]
+    means = []
+    for _ in range(8):
+        [p] = learner.ask(1)
+        learner.tell(p.trial, cost=bowl(p.theta), success=True)
+        mixture = learner.snapshot()["mixture"]
+        assert isinstance(mixture, dict)
+        means.append(mixture["means"])
+    assert before is None
+    assert means[0] == means[3]
+    assert means[0] != means[-1]
+
+
+def test_a_late_outcome_is_told_once_and_moves_the_search() -> None:
+    on_time, late = (create("cmaes", Space.unit(3), BATCH, seed=1) for _ in range(2))
+    for learner in (on_time, late):
+        first = learner.ask(BATCH)
+        for p in first:
+            if p.trial:
+                learner.tell(p.trial, cost=bowl(p.theta), success=True)
+        batch(learner, bowl)
+    late.tell(0, cost=0.0, success=True)
+    assert not np.array_equal(batch(on_time, bowl), batch(late, bowl))
+    for _ in range(10):
+        batch(late, bowl)
+    assert late.recommend().theta == pytest.approx(0.7, abs=0.1)
+
+
+def test_failures_rank_behind_every_success() -> None:
+    """Half of the box fails at no cost; the search stays in the other half."""
+    learner = create("cmaes", Space.unit(3), BATCH, seed=2)
+    for _ in range(20):
+        for p in learner.ask(BATCH):
+            won = p.theta[0] < 0.5
+            learner.tell(p.trial, cost=2.0 - p.theta[0] if won else 0.0, success=bool(won))
+    tried = np.array([p.theta[0] for p in learner.ask(BATCH)])
+    assert np.mean(tried < 0.5) > 0.5
+    assert learner.recommend().theta[0] > 0.3
+
+
+def test_a_snapshot_has_the_distribution() -> None:
+    learner = create("cmaes", Space.unit(4), 400, seed=0, spread=0.05)
+    first = np.array([p.theta for p in learner.ask(400)])
+    mixture = learner.snapshot()["mixture"]
+    assert isinstance(mixture, dict)
+    np.testing.assert_allclose(mixture["means"][0], 0.5)
+    np.testing.assert_allclose(np.sqrt(np.diag(mixture["covariances"][0])), 0.05, rtol=1e-3)
+    assert first.std(axis=0) == pytest.approx(0.05, rel=0.15)
+
+
+def best_alone(seed: int, trials: int) -> float:
+    """Return the best cost that the package finds by itself, generation by generation."""
+    problem = shifted(sphere, 20, seed)
+
+    def cost(u: Array) -> float:
+        return float(problem.cost(problem.space.denormalise(u)))
+
+    tried = np.concatenate(alone(20, seed, cost, -(-trials // 12)))[:trials]
+    return min(cost(u) for u in tried)
+
+
+@pytest.mark.slow
+def test_in_batches_of_forty_it_is_no_worse_than_the_package_alone() -> None:
+    """The package by itself learns after every 12 trials, here it has to wait for 40."""
+    seeds = range(40)
+    [row] = benchmark(["cmaes"], lambda seed: shifted(sphere, 20, seed), seeds=seeds)
+    assert row.best <= 1.1 * np.mean([best_alone(seed, 400) for seed in seeds])
