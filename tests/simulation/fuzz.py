@@ -41,8 +41,8 @@ from shearline.learner.run.doorman import Doorman
 from shearline.learner.run.incoming import Incoming
 from shearline.protocol.codec import TO_EVALUATOR, decode, encode
 from shearline.protocol.errors import ProtocolError
+from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import Arrival
 from shearline.protocol.messages import (
     VERSION,
     Ack,

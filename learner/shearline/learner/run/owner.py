@@ -12,7 +12,6 @@ import math
 import time
 from collections import Counter, deque
 from collections.abc import Callable
-from queue import Empty
 
 from shearline.learner.base import Recommendation
 from shearline.learner.dispatcher import Dispatcher, status
@@ -36,14 +35,11 @@ from shearline.learner.run.fitter import Fitter, Modelled, Recommended
 from shearline.learner.run.inbox import Inbox
 from shearline.learner.run.incoming import Incoming
 from shearline.learner.run.journal import Journal as JournalFile
-from shearline.learner.run.outgoing import Outgoing
+from shearline.learner.run.outgoing import Outgoing, together
 from shearline.learner.run.pulse import Pulse
 from shearline.learner.run.signals import Hurry
-from shearline.protocol.link import Arrival, Presence
+from shearline.protocol.intake import Arrival, Presence
 from shearline.protocol.messages import Snapshot, Status
-
-#: Items taken in one step: one write for all of them, and a bound on how long a step takes.
-STEP_ITEMS_MAX = 32
 
 STATUS_EVERY_S = 0.5
 
@@ -85,6 +81,7 @@ class Owner:
         recommendation: The learner's last word.
         ending: How the run ended, and
         why: why, if not by completing.
+        tick_s: How often it has to be woken at least [s].
     """
 
     def __init__(
@@ -113,7 +110,7 @@ class Owner:
         self._pulse = Pulse()
         self._left: list[object] = []
         self._news: deque[Instruction] = deque()
-        self._tick_s = min(config.lease_s / 8, 0.1)
+        self.tick_s = min(config.lease_s / 8, 0.1)
         # Reads like the epoch, but neither jumps nor goes back while the process lives.
         self._zero_s = time.time() - time.monotonic()
         self._next_tick_s = self._next_status_s = 0.0
@@ -134,7 +131,7 @@ class Owner:
         """
         while not self._is_over():
             began_cpu_s = time.thread_time()
-            items = self._left or self._take()
+            items = self._left or self._inbox.take()
             began_s, self._left = time.perf_counter(), []
             out: list[Instruction] = []
             for number, item in enumerate(items, start=1):
@@ -147,7 +144,8 @@ class Owner:
                     self._left = items[number:]
                     break
             if self._now_s() >= self._next_tick_s:
-                self._next_tick_s = self._now_s() + self._tick_s
+                # Who is woken just before the time need not wait for the next waking.
+                self._next_tick_s = self._now_s() + 0.9 * self.tick_s
                 out += self.dispatcher.handle(Tick(), self._now_s())
             self._carry_out(out)
             self._tell(began_cpu_s + STEP_TELLS_S)
@@ -190,17 +188,6 @@ class Owner:
     def _now_s(self) -> float:
         return self._zero_s + time.monotonic()
 
-    def _take(self) -> list[object]:
-        """Wait for something to do until the next tick, then take what else is there."""
-        items: list[object] = []
-        try:
-            items.append(self._inbox.get(timeout=max(self._next_tick_s - self._now_s(), 0.0005)))
-            while len(items) < STEP_ITEMS_MAX:
-                items.append(self._inbox.get_nowait())
-        except Empty:
-            pass
-        return items
-
     def _event(self, item: object) -> Event | None:
         if isinstance(item, Event):
             return item
@@ -228,12 +215,13 @@ class Owner:
         if entries:
             self._journal.append(entries, sync=any(isinstance(e, _DEAR) for e in entries))
         # Evaluators wait for what is said to them; observers and the log do not.
-        for instruction in out:
-            if not isinstance(instruction, Publish | Say):
-                self._effect(instruction)
+        for send in together([i for i in out if isinstance(i, Send)]):
+            self._outgoing.send(send.evaluator, send.message, self._now_s())
         for instruction in out:
             if isinstance(instruction, Publish | Say):
                 self._news.append(instruction)
+            else:
+                self._effect(instruction)
 
     def _tell(self, until_cpu_s: float) -> None:
         """Let observers and the log know, in order; no further once the step has cost enough."""
@@ -244,8 +232,6 @@ class Owner:
 
     def _effect(self, instruction: Instruction) -> None:
         match instruction:
-            case Send(evaluator, message):
-                self._outgoing.send(evaluator, message, self._now_s())
             case Publish(message):
                 self._outgoing.publish(message)
             case Broadcast(message):
