@@ -93,6 +93,7 @@ class CMAES(EpisodicLearner):
     """
 
     name = "cmaes"
+    fits = True
 
     def __init__(
         self, space: Space, episode_length: int = 20, seed: int = 0, **switches: object

@@ -16,6 +16,7 @@ from shearline.learner.base import Array, Proposal, Recommendation
 from shearline.learner.errors import LearnerError
 from shearline.learner.ledger import Ledger, Trials
 from shearline.learner.recommend import Focus, elite_focus, recommendation
+from shearline.learner.threads import load
 from shearline.protocol.space import Space
 
 #: More proposals in one call than any run has trials; a slip in units, not a wish.
@@ -36,6 +37,9 @@ class EpisodicLearner(ABC):
 
     #: Name under which :func:`shearline.learner.create` knows it.
     name: str
+
+    #: Whether renewing the model is a fit, for which libraries are loaded that take a second.
+    fits = False
 
     def __init__(self, space: Space, episode_length: int = 20, seed: int = 0) -> None:
         if episode_length < 1:
@@ -84,6 +88,11 @@ class EpisodicLearner(ABC):
             raise LearnerError("nothing has been asked for yet: ask and tell before recommend")
         trials = self._ledger.trials()
         return recommendation(self.space, trials, self._focus(trials))
+
+    def warm(self) -> None:
+        """Load what the first fit needs; for whoever has time before it. By default nothing."""
+        if self.fits:
+            load()
 
     def snapshot(self) -> Mapping[str, object]:
         """Return the model as plain numbers, strings, lists and dicts.

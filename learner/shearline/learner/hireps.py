@@ -101,6 +101,7 @@ class HiREPS(EpisodicLearner):
     """
 
     name = "hireps"
+    fits = True
 
     def __init__(
         self, space: Space, episode_length: int = 20, seed: int = 0, **switches: object

@@ -25,6 +25,11 @@ def _controller() -> Any:
     return ThreadpoolController()
 
 
+def load() -> None:
+    """Load the libraries of fits, which takes a second, unless they are."""
+    _controller()
+
+
 def fitting() -> AbstractContextManager[object]:
     """Return a context in which BLAS and OpenMP libraries use one thread."""
     context: AbstractContextManager[object] = _controller().limit(limits=1)

@@ -47,6 +47,15 @@ class Forgetful(RandomSearch):
         return [Proposal(p.trial + 7, p.theta) for p in super().ask(n)]
 
 
+class Fitting(RandomSearch):
+    """A learner that loads something heavy when told to, and says so."""
+
+    box: SimpleQueue[Any]
+
+    def warm(self) -> None:
+        self.box.put("warm")
+
+
 class Odd(RandomSearch):
     """A learner whose model is not fit for JSON as it is."""
 
@@ -77,6 +86,30 @@ def test_a_fitter_answers_with_seeded_proposals_then_its_last_word() -> None:
     assert [p.trial for p in first.trials] == [0, 1, 2, 3]
     assert [p.seed for p in first.trials] == [trial_seed(3, n) for n in range(4)]
     assert last.recommendation is not None
+
+
+def test_a_learner_loads_what_it_needs_later_once_evaluators_have_work() -> None:
+    box = SimpleQueue[Any]()
+
+    def make() -> Learner:
+        learner = Fitting(SPACE, 4, 3)
+        learner.box = box
+        return learner
+
+    fitter = Fitter(make, 3, box)
+    fitter.start(Book())
+    for episode in range(2):
+        fitter.ask(Ask(episode, 4, (), 4 * episode))
+    fitter.finish(())
+    kinds = [type(box.get(timeout=ANSWER_S)).__name__ for _ in range(6)]
+    assert kinds == [
+        "ProposalsReady",
+        "Modelled",
+        "str",
+        "ProposalsReady",
+        "Modelled",
+        "Recommended",
+    ]
 
 
 @pytest.mark.parametrize(

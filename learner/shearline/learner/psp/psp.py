@@ -37,6 +37,8 @@ class PSP(EpisodicLearner):
         name: Name it was created under.
     """
 
+    fits = True
+
     def __init__(
         self, space: Space, episode_length: int, seed: int, config: PSPConfig, name: str = "psp"
     ) -> None:

@@ -24,6 +24,7 @@ from shearline.learner.confirmation import tuples
 from shearline.learner.dispatcher.book import Book
 from shearline.learner.dispatcher.events import LearnerFailed, Planned, ProposalsReady
 from shearline.learner.dispatcher.instructions import Ask, Told
+from shearline.learner.episodic import EpisodicLearner
 from shearline.learner.errors import LearnerError
 from shearline.learner.run.seeds import trial_seed
 from shearline.protocol.errors import ShearlineError
@@ -107,6 +108,8 @@ class Fitter:
         self._inbox.put(ProposalsReady(ask.episode, planned))
         if ask.purpose is Purpose.LEARNING:
             self._inbox.put(Modelled(ask.episode, model_json(learner)))
+        if ask.episode == 0 and isinstance(learner, EpisodicLearner):
+            learner.warm()  # while evaluators have work: at the first update they would wait for it
 
     def _propose(self, learner: Learner, purpose: Purpose, trials: int, first: int) -> list[Array]:
         """Return the tuples of an episode: the learner's own, or what is to be confirmed."""
