@@ -14,9 +14,10 @@ import pytest
 from shearline.deploy.launch import RunFailed
 from shearline.deploy.studies import repeats
 from shearline.deploy.studies.batch import folders
-from shearline.deploy.studies.repeats import RESULTS, gather
+from shearline.deploy.studies.repeats import RESULTS, Progress, gather
 from shearline.deploy.studies.task import problem
 from shearline.protocol.errors import RecordError
+from shearline.protocol.messages import Status
 from shearline.studies.benchmark import run_learner
 from shearline.studies.provenance import code_of
 from shearline.studies.repeat import Job, Placement, Repeat, jobs
@@ -45,6 +46,14 @@ def made(job: Job, code: str | None = None) -> Repeat:
         trial=job.seed,
         evaluator="evaluator-0",
     )
+
+
+STATUS = Status(
+    run="batch-0001", task="repeat", learner="plan", epoch=1, state="running", episode=0,
+    episodes=1, trials_per_episode=3, pending=1, leased=1, done=1, counted=1, lost=0, late=0,
+    duplicates=0, aborted=0, rejected=0, rate_hz=0.5, step_ms_max=0.0, evaluators=[], history=[],
+    at_s=0.0,
+)  # fmt: skip
 
 
 def test_what_is_there_is_not_run_again(tmp_path: Path) -> None:
@@ -91,6 +100,19 @@ def test_renewing_replaces_what_other_code_made(tmp_path: Path) -> None:
     assert found[0].code == code_of("lhs")
     assert found[0].run == "batch-0001"
     assert found[1] == made(some(2)[1])
+
+
+def test_a_terminal_shows_how_far_a_batch_is_and_a_pipe_does_not(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Store(tmp_path / RESULTS) as store:
+        progress = Progress(store, tmp_path, some(3), some(3), quiet=False)
+        progress.update(STATUS)
+        assert capsys.readouterr().err == ""
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+        progress.update(STATUS)
+        assert "1 of 3 repeats, 0.50/s, 0:04 left" in capsys.readouterr().err
+        assert progress.lacking == 3
 
 
 class Lossy:

@@ -61,18 +61,15 @@ class Progress:
         if time.monotonic() >= self._next_s:
             self.take()
             self._next_s = time.monotonic() + HARVEST_S
-        if sys.stderr.isatty():
-            total = status.episodes * status.trials_per_episode
-            print(
-                f"\r{status.counted} of {total} repeats, {status.rate_hz:.2f}/s,"
-                f" {duration(time_left_s(status))} left  ",
-                end="",
-                file=sys.stderr,
-                flush=True,
-            )
+        total = status.episodes * status.trials_per_episode
+        _show(
+            f"{status.counted} of {total} repeats, {status.rate_hz:.2f}/s,"
+            f" {duration(time_left_s(status))} left"
+        )
 
     def say(self, text: str) -> None:
         """Print what happened to a process, for people."""
+        _show("")
         print(f"{time.strftime('%H:%M:%S')} {text}", file=sys.stderr, flush=True)
 
     def take(self) -> None:
@@ -85,9 +82,10 @@ class Progress:
 
     def _announce(self, cell: Job) -> None:
         done = [self.store[job] for job in self.wanted if _cell(job) == cell]
+        _show("")
         for curve in curves(done):
             print(
-                f"\r{curve.function}, {curve.placement}, {curve.dimensions} parameters,"
+                f"{curve.function}, {curve.placement}, {curve.dimensions} parameters,"
                 f" {curve.learner}: best {curve.final} ({curve.runs} runs,"
                 f" {curve.learner_s:.2f} s of learner each)",
                 flush=True,
@@ -170,6 +168,12 @@ def _warn(old: set[Job]) -> None:
             file=sys.stderr,
             flush=True,
         )
+
+
+def _show(text: str) -> None:
+    """Put a passing line on the terminal in place of the last one; elsewhere nothing."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
 
 
 def _cell(job: Job) -> Job:
