@@ -60,9 +60,16 @@ class Browser:
         self._asked = 0
         self._left = b""
         self._pages: dict[str, Page] = {}
+        self._targets: list[str] = []
 
     def open(
-        self, path: Path, *, width_px: int = 1280, height_px: int = 900, dark: bool = False
+        self,
+        path: Path,
+        *,
+        width_px: int = 1280,
+        height_px: int = 900,
+        dark: bool = False,
+        script: bool = True,
     ) -> Page:
         """Load a file and return its page once everything in it is there.
 
@@ -71,11 +78,13 @@ class Browser:
             width_px: Of the viewport, in CSS pixels; below 600 it is taken for a phone.
             height_px: Likewise.
             dark: Whether the reader prefers dark pages.
+            script: Whether scripts may run.
 
         Raises:
             RecordError: If the browser does not answer.
         """
         target = self.ask("Target.createTarget", url="about:blank")["targetId"]
+        self._targets.append(target)
         session = self.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         page = self._pages[session] = Page(self, session)
         for domain in ("Page", "Runtime", "Log", "Network"):
@@ -84,11 +93,19 @@ class Browser:
         page.ask("Emulation.setDeviceMetricsOverride", **metrics, mobile=width_px < 600)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         page.ask("Emulation.setEmulatedMedia", features=[scheme])
+        page.ask("Emulation.setScriptExecutionDisabled", value=not script)
         page.ask("Page.navigate", url=path.resolve().as_uri())
         until_s = time.monotonic() + PATIENCE_S
         while not page.loaded:
             self._hear(until_s)
         return page
+
+    def close_pages(self) -> None:
+        """Close every page; the browser stays."""
+        for target in self._targets:
+            self.ask("Target.closeTarget", targetId=target)
+        self._targets.clear()
+        self._pages.clear()
 
     def ask(self, method: str, session: str | None = None, **parameters: Any) -> dict[str, Any]:
         """Ask for one thing and return the answer.

@@ -26,10 +26,10 @@
     const number = Number(text);
     return text === "" || Number.isNaN(number) ? text : number;
   };
-  const compare = (a, b) => {
-    if (typeof a === "number" && typeof b === "number") return a - b;
+  // What is no number among numbers, a lost trial's cost, comes last either way.
+  const compare = (a, b, sign) => {
     if (typeof a !== typeof b) return typeof a === "number" ? -1 : 1;
-    return a.localeCompare(b);
+    return sign * (typeof a === "number" ? a - b : a.localeCompare(b));
   };
   for (const table of document.querySelectorAll("table.sortable")) {
     table.tHead.addEventListener("click", (event) => {
@@ -40,7 +40,7 @@
       head.setAttribute("aria-sort", descending ? "descending" : "ascending");
       const sign = descending ? -1 : 1;
       const rows = [...table.tBodies[0].rows].map((row) => [value(row, head.cellIndex), row]);
-      rows.sort(([a], [b]) => sign * compare(a, b));
+      rows.sort(([a], [b]) => compare(a, b, sign));
       table.tBodies[0].append(...rows.map(([, row]) => row));
     });
   }
