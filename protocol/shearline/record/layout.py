@@ -35,6 +35,7 @@ class Shape:
         has_scene: Whether bodies are known.
         slices: How many slices of the partition there are.
         trials: Numbers of the trials that have a page of their own.
+        titles: What their pages are called, where a number does not tell them apart.
     """
 
     config: RunConfig | None = None
@@ -45,6 +46,7 @@ class Shape:
     has_scene: bool = False
     slices: int = 0
     trials: Sequence[int] = ()
+    titles: Sequence[str] = ()
 
 
 def layout(shape: Shape, *, active_tab: int = 0) -> rrb.Blueprint:
@@ -61,6 +63,15 @@ def layout(shape: Shape, *, active_tab: int = 0) -> rrb.Blueprint:
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=active_tab),
         rrb.TimePanel(timeline=timeline, state="collapsed", play_state="paused"),
+        collapse_panels=True,
+    )
+
+
+def pages(shape: Shape) -> rrb.Blueprint:
+    """Return the layout of nothing but the pages of single trials."""
+    return rrb.Blueprint(
+        _pages(shape),
+        rrb.TimePanel(timeline=page.CLOCK, state="collapsed", play_state="paused"),
         collapse_panels=True,
     )
 
@@ -94,24 +105,23 @@ def _trials(shape: Shape) -> rrb.Container:
 
 def _pages(shape: Shape) -> rrb.Container:
     """Return the pages of single trials, side by side."""
-    pages = [
-        _page(root, trial, shape) for root, trial in zip(page.ROOTS, shape.trials, strict=False)
-    ]
-    name = " beside ".join(f"Trial {trial}" for trial in shape.trials)
-    return rrb.Horizontal(*pages, name=name)
+    titles = shape.titles or [f"trial {trial}" for trial in shape.trials]
+    shown = [_page(root, title, shape) for root, title in zip(page.ROOTS, titles, strict=False)]
+    name = " beside ".join(title.capitalize() for title in titles)
+    return rrb.Horizontal(*shown, name=name)
 
 
-def _page(root: str, trial: int, shape: Shape) -> rrb.Container:
+def _page(root: str, title: str, shape: Shape) -> rrb.Container:
     head: list[rrb.View | rrb.Container] = [
-        rrb.TextDocumentView(origin=f"/{root}/card", name=f"trial {trial}")
+        rrb.TextDocumentView(origin=f"/{root}/card", name=title)
     ]
     if shape.tip is not None:
         head.append(_tip(f"{root}/scene", "tip, force, region of interest", shape))
     if shape.has_scene:
         head.append(_arm(f"{root}/scene"))
-    phases = rrb.StateTimelineView(origin=f"/{root}/phase", name=f"phases of trial {trial}")
+    phases = rrb.StateTimelineView(origin=f"/{root}/phase", name=f"phases of {title}")
     plots = [
-        rrb.TimeSeriesView(origin=f"/{root}/signals/{name}", name=f"{name}, trial {trial}")
+        rrb.TimeSeriesView(origin=f"/{root}/signals/{name}", name=f"{name}, {title}")
         for name in shape.groups[:CHARTS]
     ]
     # side by side, a card beside its scene would leave neither room

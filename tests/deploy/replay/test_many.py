@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
 import pytest
@@ -49,6 +49,7 @@ def test_no_more_cases_are_taken_than_can_be_under_way(cases: list[Case]) -> Non
     for done in range(1, 6):
         next(verified)
         assert len(taken) <= done + 2 * AHEAD
+    assert isinstance(verified, Generator)
     verified.close()
     assert not multiprocessing.active_children()
 

@@ -1,70 +1,66 @@
-"""A replayed trial in Rerun: one recording of what is on record, one of what came out again.
+"""A replayed trial in Rerun: what is on record and what came out, side by side on one clock.
 
-Both are drawn by the same hand as a whole run is, so that they can be held against each other.
+The pages are those of ``shearline view RUN --trial A --beside B``; only that here both are the same
+trial. A trial that never ended has one page.
 """
 
 from __future__ import annotations
 
-import subprocess
-import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
-import msgspec
 import rerun as rr
 
 from shearline.evaluator.replay import Replayed
-from shearline.protocol.errors import RecordError
 from shearline.protocol.messages import Counted, OutcomeKind
-from shearline.record.picture import Picture
+from shearline.record.layout import Shape, pages
+from shearline.record.page import ROOTS, draw_page
 from shearline.record.reader import Run, Trace, to_trace
-from shearline.record.view import APPLICATION, layout_for
-from shearline.record.viewer import check_ended_well, executable, quiet_environment, viewer
+from shearline.record.view import APPLICATION, connected, shape_for
+from shearline.record.viewer import check_ended_well, free_port, viewer
 
 
 def view(run: Run, replayed: Replayed) -> None:
-    """Show the recorded and the replayed trial in the viewer; returns when it is closed.
+    """Show both in the viewer; returns when it is closed.
 
     Raises:
         RecordError: If there is no viewer or no screen.
     """
-    with tempfile.TemporaryDirectory(prefix="shearline-replay-") as folder:
-        paths = recordings(run, replayed, Path(folder))
-        with viewer([str(path) for path in paths]) as child:
-            check_ended_well(child)
+    port = free_port()
+    with viewer([], port) as child:
+        stream = connected(port)
+        stream.send_blueprint(pages(shape(run, replayed)))
+        draw(stream, run, replayed)
+        stream.flush()
+        check_ended_well(child)
 
 
 def save(run: Run, replayed: Replayed, path: Path) -> None:
-    """Write both recordings into one Rerun file.
-
-    Raises:
-        RecordError: If the viewer, which merges them, is missing or cannot write there.
-    """
-    with tempfile.TemporaryDirectory(prefix="shearline-replay-") as folder:
-        paths = [str(part) for part in recordings(run, replayed, Path(folder))]
-        with quiet_environment() as environment:
-            merged = subprocess.run(  # noqa: S603 - the viewer we depend on, our own arguments
-                [executable(), "rrd", "merge", *paths, "-o", str(path)],
-                env=environment,
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-    if merged.returncode != 0:
-        said = merged.stderr.strip().splitlines() or ["no reason given"]
-        raise RecordError(f"{path} cannot be written: {said[-1]}")
+    """Write both into one Rerun file."""
+    stream = rr.RecordingStream(APPLICATION, recording_id=f"{run.name} {replayed.case.trial}")
+    stream.save(path, default_blueprint=pages(shape(run, replayed)))
+    draw(stream, run, replayed)
+    stream.flush()
+    stream.disconnect()
 
 
-def recordings(run: Run, replayed: Replayed, folder: Path) -> list[Path]:
-    """Write a Rerun file for each that there is, recorded and replayed, and return their paths."""
-    case, paths = replayed.case, []
-    if case.outcome is not None:
-        traces = run.traces(case.trial)
-        paths.append(_draw(run, "recorded", folder, case.outcome, traces[-1] if traces else None))
-    message = replayed.trace_data()
-    trace = None if message is None else to_trace(message)
-    paths.append(_draw(run, "replayed", folder, as_outcome(replayed), trace))
-    return paths
+def draw(stream: rr.RecordingStream, run: Run, replayed: Replayed) -> None:
+    """Draw the page of each."""
+    shown = _pages(run, replayed).values()
+    for root, (outcome, traces) in zip(ROOTS, shown, strict=False):
+        draw_page(stream, root, outcome, traces, run.config, run.scene)
+
+
+def shape(run: Run, replayed: Replayed) -> Shape:
+    """Return what the layout has to have room for."""
+    shown = _pages(run, replayed)
+    trace = next((traces[-1] for _, traces in shown.values() if traces), None)
+    trials = [replayed.case.trial] * len(shown)
+    return replace(
+        shape_for(run.config, trace, run.scene, trials=trials),
+        titles=[f"trial {replayed.case.trial}, {name}" for name in shown],
+    )
 
 
 def as_outcome(replayed: Replayed) -> Counted:
@@ -90,16 +86,12 @@ def as_outcome(replayed: Replayed) -> Counted:
     )
 
 
-def _draw(run: Run, name: str, folder: Path, outcome: Counted, trace: Trace | None) -> Path:
-    path = folder / f"{name}.rrd"
-    label = f"trial {outcome.trial}, {name}"
-    stream = rr.RecordingStream(APPLICATION, recording_id=f"{run.name} {label}")
-    stream.save(path, default_blueprint=layout_for(run.config, trace))
-    stream.send_recording_name(label)
-    picture = Picture(stream, run.config)
-    picture.outcome(msgspec.structs.replace(outcome, evaluator=outcome.evaluator or name))
-    if trace is not None:
-        picture.trace(trace)
-    stream.flush()
-    stream.disconnect()
-    return path
+def _pages(run: Run, replayed: Replayed) -> dict[str, tuple[Counted, list[Trace]]]:
+    """Return outcome and traces of what is on record, if it is, and of what came out."""
+    shown = {}
+    if replayed.case.outcome is not None:
+        shown["recorded"] = (replayed.case.outcome, run.traces(replayed.case.trial))
+    message = replayed.trace_data()
+    traces = [] if message is None else [to_trace(message)]
+    shown["replayed"] = (as_outcome(replayed), traces)
+    return shown
