@@ -1,19 +1,29 @@
 """The worker's decisions, without a network, a thread or a clock."""
 
-from collections.abc import Iterable
 from itertools import pairwise
-from typing import Any, TypeVar
 
 import pytest
-from hypothesis import settings
-from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from evaluator.mail_kit import (
+    BOOT,
+    LEASE_S,
+    SPEC,
+    ack,
+    busy,
+    drive,
+    joined,
+    mailbox,
+    of,
+    result,
+    said,
+    token,
+    trial,
+    welcome,
+)
 
 from shearline.evaluator.mail import (
     Abort,
     Beat,
     Ended,
-    Event,
     Gate,
     Heard,
     Instruction,
@@ -37,117 +47,21 @@ from shearline.evaluator.mailbox import (
     RESEND_S_MAX,
     RESEND_S_MIN,
     SILENCE_LEASES,
-    WAIT_S_MAX,
-    Mailbox,
 )
 from shearline.protocol.codec import encode
 from shearline.protocol.messages import (
-    VERSION,
     Ack,
     Bye,
     Command,
     CommandKind,
     Credit,
     Hello,
-    Message,
     OutcomeKind,
     Refused,
     Renew,
     Result,
-    TaskSpec,
-    Trial,
     Verdict,
-    Welcome,
 )
-
-M = TypeVar("M", bound=Message)
-I = TypeVar("I", bound=Instruction)  # noqa: E741 - beside M
-BOOT = "boot-0001"
-LEASE_S = 2.0
-SPEC = TaskSpec(name="sleep-1", space={"x": ("m", 0.0, 1.0)})
-
-
-def mailbox(*, warm: bool = True, takes_task: bool = False, pulses: bool = False) -> Mailbox:
-    hello = Hello(
-        boot=BOOT, version=VERSION, task_digest="", kind="simulator", engine="e", credits=2
-    )
-    return Mailbox(hello, warm=warm, takes_task=takes_task, pulses=pulses)
-
-
-def welcome(epoch: int = 1, **changes: Any) -> Heard:
-    facts: dict[str, Any] = {"boot": BOOT, "epoch": epoch, "task": SPEC, "lease_s": LEASE_S}
-    return Heard(Welcome(**(facts | changes)))
-
-
-def trial(number: int, **changes: Any) -> Trial:
-    facts: dict[str, Any] = {
-        "boot": BOOT,
-        "epoch": 1,
-        "trial": number,
-        "episode": 0,
-        "attempt": 1,
-        "token": token(number),
-        "theta": [0.5],
-        "seed": number,
-        "lease_s": LEASE_S,
-        "deadline_s": 10.0,
-    }
-    return Trial(**(facts | changes))
-
-
-def token(number: int) -> str:
-    return f"token-{number:06}"
-
-
-def result(number: int) -> Result:
-    return Result(
-        boot=BOOT,
-        token=token(number),
-        trial=number,
-        kind=OutcomeKind.SUCCESS,
-        cost=float(number),
-        seed=number,
-    )
-
-
-def ack(number: int) -> Heard:
-    return Heard(Ack(boot=BOOT, token=token(number), verdict=Verdict.COUNTED))
-
-
-def said(out: Iterable[Instruction], kind: type[M]) -> list[M]:
-    return [i.message for i in out if isinstance(i, Send) and isinstance(i.message, kind)]
-
-
-def of(out: Iterable[Instruction], kind: type[I]) -> list[I]:
-    return [i for i in out if isinstance(i, kind)]
-
-
-def joined(**how: bool) -> Mailbox:
-    box = mailbox(**how)
-    box.handle(LearnerAlive(1), 0.0)
-    box.handle(welcome(), 0.0)
-    return box
-
-
-def busy(*numbers: int, **how: bool) -> Mailbox:
-    """Return a mailbox that holds these trials and runs the first."""
-    box = joined(**how)
-    for number in numbers:
-        box.handle(Heard(trial(number)), 0.0)
-    box.handle(Started(token(numbers[0])), 0.0)
-    return box
-
-
-def drive(box: Mailbox, until_s: float, now_s: float = 0.0) -> list[tuple[float, Instruction]]:
-    """Let time pass as the postman would, and return what was done when."""
-    done = []
-    while now_s < until_s and not box.over:
-        now_s = min(until_s, now_s + max(box.wait_s(now_s), 1e-6))
-        done += [(now_s, instruction) for instruction in box.handle(Tick(), now_s)]
-    return done
-
-
-# -- coming --------------------------------------------------------------------------------------
 
 
 def test_hello_is_repeated_ever_more_slowly_until_an_answer_comes() -> None:
@@ -429,107 +343,3 @@ def test_after_the_end_nothing_is_done() -> None:
 def test_a_long_reason_can_be_said() -> None:
     out = joined().handle(Leave(4, "x" * 9999), 1.0)
     assert all(encode(i.message) for i in of(out, Send))
-
-
-# -- laws ----------------------------------------------------------------------------------------
-
-NUMBERS = st.integers(0, 5)
-
-
-class AnyStory(RuleBasedStateMachine):
-    """Whatever happens in whatever order, a worker keeps to these laws."""
-
-    @initialize(pulses=st.booleans(), warm=st.booleans())
-    def start(self, *, pulses: bool, warm: bool) -> None:
-        self.box = mailbox(pulses=pulses, warm=warm)
-        self.now_s = 0.0
-        self.ran: list[str] = []
-        self.results: dict[str, Result] = {}
-        self.over = False
-
-    def tell(self, event: Event) -> None:
-        out = self.box.handle(event, self.now_s)
-        assert not (self.over and out)
-        assert self.box.warm or not of(out, Run)
-        self.ran += [run.trial.token for run in of(out, Run)]
-        for sent in said(out, Message):
-            encode(sent)
-            assert isinstance(sent, Hello | Credit | Renew | Result | Bye)
-        for sent_result in said(out, Result):
-            assert self.results.setdefault(sent_result.token, sent_result) == sent_result
-        self.over |= bool(of(out, Quit))
-        assert not of(out, Quit) or isinstance(out[-1], Quit)
-
-    @rule(number=NUMBERS)
-    def given(self, number: int) -> None:
-        self.tell(Heard(trial(number)))
-
-    @rule(number=NUMBERS)
-    def acked(self, number: int) -> None:
-        self.tell(ack(number))
-
-    @rule(epoch=st.integers(1, 3))
-    def alive(self, epoch: int) -> None:
-        self.tell(LearnerAlive(epoch))
-
-    @rule(epoch=st.integers(1, 3))
-    def gone(self, epoch: int) -> None:
-        self.tell(LearnerGone(epoch))
-
-    @rule(epoch=st.integers(1, 3), held=st.booleans())
-    def welcomed(self, epoch: int, *, held: bool) -> None:
-        self.tell(welcome(epoch, held=held))
-
-    @rule(kind=st.sampled_from([CommandKind.HOLD, CommandKind.RESUME]))
-    def commanded(self, kind: CommandKind) -> None:
-        self.tell(Heard(Command(kind=kind)))
-
-    @rule()
-    def readied(self) -> None:
-        self.tell(Ready("engine", "digest"))
-
-    @rule()
-    def started(self) -> None:
-        if self.box.held and self.box.running is None:
-            self.tell(Started(next(iter(self.box.held))))
-
-    @rule()
-    def ended(self) -> None:
-        if self.box.running is not None:
-            self.tell(Ended(result(int(self.box.running.token[-6:]))))
-
-    @rule()
-    def beaten(self) -> None:
-        self.tell(Beat())
-
-    @rule(passed_s=st.floats(0.0, 3.0))
-    def waited(self, passed_s: float) -> None:
-        self.now_s += passed_s
-        self.tell(Tick())
-
-    @rule(finish=st.booleans())
-    def leaves(self, *, finish: bool) -> None:
-        self.tell(Leave(130, "interrupted", finish))
-
-    @invariant()
-    def no_attempt_is_run_twice(self) -> None:
-        assert len(self.ran) == len(set(self.ran))
-
-    @invariant()
-    def every_attempt_is_in_one_place(self) -> None:
-        places = [*self.box.held, *self.box.unacked, *self.box.answered]
-        assert len(places) == len(set(places))
-
-    @invariant()
-    def the_next_look_is_never_far_off(self) -> None:
-        assert 0.0 <= self.box.wait_s(self.now_s) <= WAIT_S_MAX
-
-    @invariant()
-    def leaving_is_bounded(self) -> None:
-        if self.box.leaving is not None and not self.over:
-            drive_to_s = self.now_s + FINISH_S + LEAVE_S + 1e-3
-            assert self.box.leaving.until_s <= drive_to_s
-
-
-TestAnyStory = AnyStory.TestCase
-TestAnyStory.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
