@@ -20,6 +20,7 @@ LEARNERS: Mapping[str, str] = MappingProxyType(
     {
         "psp": "shearline.learner.psp.psp:working",
         "psp-paper": "shearline.learner.psp.psp:literal",
+        "psp-ranked": "shearline.learner.ranked.ranked:ranked",
         "hireps": "shearline.learner.hireps:HiREPS",
         "cmaes": "shearline.learner.cmaes:CMAES",
         "ga": "shearline.learner.ga:GeneticAlgorithm",

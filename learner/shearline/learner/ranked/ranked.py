@@ -1,0 +1,96 @@
+"""The ranked learner: draw around the elite, rank by the partition, never trust a lucky success."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+
+import numpy as np
+
+from shearline.learner.base import Array
+from shearline.learner.episodic import EpisodicLearner
+from shearline.learner.ledger import Trials
+from shearline.learner.lhs import latin_hypercube
+from shearline.learner.ranked.config import RankedConfig
+from shearline.learner.ranked.model import Model, fit_model
+from shearline.learner.recommend import Focus
+from shearline.learner.region import fold
+from shearline.protocol.space import Space
+
+
+class RankedPSP(EpisodicLearner):
+    """PSP whose partition ranks.
+
+    Args:
+        space: What is being learned.
+        episode_length: Trials of an episode.
+        seed: 0 or more.
+        config: Its numbers.
+    """
+
+    name = "psp-ranked"
+    fits = True
+
+    def __init__(self, space: Space, episode_length: int, seed: int, config: RankedConfig) -> None:
+        super().__init__(space, episode_length, seed)
+        self.config = config
+        self._design: Array = np.empty((0, len(space)))
+        self._model_now: Model | None = None
+        self._wins: Array = np.empty((0, len(space)))
+
+    def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
+        self._design = latin_hypercube(rng, self.episode_length, len(self.space))
+        if episode:
+            self._renew(trials)
+
+    def _renew(self, trials: Trials) -> None:
+        self._wins = trials.u[trials.success]
+        if len(self._wins) >= self.config.wins_min:
+            stand = None if self._model_now is None else self._model_now.elite
+            self._model_now = fit_model(trials, stand, self.episode_length, self.config)
+
+    def _draw(self, index: int, rng: np.random.Generator) -> Array:
+        if self.config.refresh and index and index % self.config.refresh == 0:
+            self._renew(self._ledger.trials())
+        if self._model_now is None:
+            return self._scout(index, rng)
+        block = self._model_now.elite.draw(rng, self.config.draws)
+        return self._model_now.choose(block, self.config)
+
+    def _scout(self, index: int, rng: np.random.Generator) -> Array:
+        """Return a tuple of the design or, every other time, one near a success."""
+        if len(self._wins) and index % 2:
+            near = self._wins[rng.integers(len(self._wins))]
+            offset = self.config.scout_spread * rng.standard_normal(len(near))
+            return fold(near + offset)
+        return np.array(self._design[index])
+
+    def _focus(self, trials: Trials) -> Focus:
+        if int(trials.success.sum()) < self.config.wins_min:
+            return super()._focus(trials)
+        stand = None if self._model_now is None else self._model_now.elite
+        model = fit_model(trials, stand, self.episode_length, self.config)
+        return Focus(model.elite.centre, np.maximum(model.elite.deviation, 1e-3))
+
+    def _model(self) -> Mapping[str, object]:
+        model = self._model_now
+        plain: dict[str, object] = {"config": asdict(self.config)}
+        if model is None:
+            return plain | {"proposal": "scouts"}
+        return plain | {
+            "proposal": "elite",
+            "elite": dict(model.elite.snapshot()),
+            "price": model.price,
+            "partition": None if model.ranking is None else dict(model.ranking.snapshot()),
+            "samples": {
+                "trial": model.trials.number.tolist(),
+                "u": model.trials.u.tolist(),
+                "cost": model.trials.cost.tolist(),
+                "good": model.good.tolist(),
+            },
+        }
+
+
+def ranked(space: Space, episode_length: int = 20, seed: int = 0, **switches: object) -> RankedPSP:
+    """Make ``psp-ranked``."""
+    return RankedPSP(space, episode_length, seed, RankedConfig().having(**switches))
