@@ -136,6 +136,7 @@ class Row:
         best: Mean over the runs of the cheapest success.
         best_se: Its standard error; ``nan`` for a single run.
         success_late: Share of successes in the last three episodes.
+        success_late_se: Its standard error; ``nan`` for a single run.
         learner_s: Mean processor time of one run spent in the learner [s].
     """
 
@@ -145,6 +146,7 @@ class Row:
     best: float
     best_se: float
     success_late: float
+    success_late_se: float
     learner_s: float
 
 
@@ -200,14 +202,19 @@ def measure(
 
 def _row(name: str, runs: list[Run], problem: str) -> Row:
     best = np.array([run.best for run in runs])
-    spread = float(best.std(ddof=1) / np.sqrt(len(runs))) if len(runs) > 1 else float("nan")
-    late = [run.success_by_episode[-3:].mean() for run in runs]
+    late = np.array([run.success_by_episode[-3:].mean() for run in runs])
     return Row(
         learner=name,
         problem=problem,
         runs=len(runs),
         best=float(best.mean()),
-        best_se=spread,
-        success_late=float(np.mean(late)),
+        best_se=standard_error(best),
+        success_late=float(late.mean()),
+        success_late_se=standard_error(late),
         learner_s=float(np.mean([run.learner_s for run in runs])),
     )
+
+
+def standard_error(values: Array) -> float:
+    """Return the standard error of the mean of values ``(k,)``; ``nan`` for a single one."""
+    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
