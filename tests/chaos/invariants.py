@@ -16,6 +16,7 @@ from shearline.learner.dispatcher.entries import (
     AttemptLapsed,
     AttemptReturned,
     AttemptRevived,
+    ConfirmationProposed,
     Entry,
     EpisodeDone,
     LearnerBooted,
@@ -89,7 +90,7 @@ class Audit:
         self.closed = 0
         self.ended: RunEnded | None = None
         self._open: range | None = None
-        self._is_opened = self._is_held = False
+        self._is_opened = self._is_held = self._is_confirming = False
         self._quorum = quorum
         self._robots = robots
         for index, entry in enumerate(entries):
@@ -142,12 +143,19 @@ class Audit:
     def _proposed(self, entry: TrialsProposed) -> None:
         assert self._open is None, "an episode opened before the one before it closed"
         assert entry.episode == self.closed, "episodes are out of order"
+        is_learning = not isinstance(entry, ConfirmationProposed)
+        assert not (is_learning and self._is_confirming), "learning went on after a confirmation"
         self._expect_going()
         numbers = [planned.trial for planned in entry.trials]
         first = len(self.trials)
         assert numbers == list(range(first, first + len(numbers))), "trial numbers have a gap"
         self._open = range(first, first + len(numbers))
         self.trials |= {number: AuditedTrial(entry.episode) for number in numbers}
+
+    def _confirming(self, entry: ConfirmationProposed) -> None:
+        assert self.closed, "a confirmation opened before anything was learned"
+        self._is_confirming = True
+        self._proposed(entry)
 
     def _issued(self, entry: AttemptIssued) -> None:
         trial = self._trial(entry.trial)
@@ -236,6 +244,7 @@ _SEEN: Mapping[type[Entry], Callable[[Audit, Any], None]] = {
     RunOpened: Audit._opened,
     LearnerBooted: Audit._booted,
     TrialsProposed: Audit._proposed,
+    ConfirmationProposed: Audit._confirming,
     AttemptIssued: Audit._issued,
     AttemptLapsed: Audit._given_up,
     AttemptReturned: Audit._given_up,

@@ -142,7 +142,7 @@ class Run:
         """Yield one plain row per trial that reached its outcome, in order of trial number.
 
         Keys: ``trial, episode, theta`` (by name), ``outcome, cost, success, evaluator, attempts,
-        seed, engine, digest, wall_s, late, why, extras``. A lost trial has no cost.
+        seed, engine, digest, wall_s, late, why, extras, purpose``. A lost trial has no cost.
         """
         for outcome in self.outcomes:
             yield _row(outcome, self.parameters)
@@ -358,6 +358,7 @@ def _row(outcome: Counted, names: list[str]) -> dict[str, Any]:
         "late": outcome.late,
         "why": outcome.why,
         "extras": outcome.extras,
+        "purpose": outcome.purpose.value,
     }
 
 
