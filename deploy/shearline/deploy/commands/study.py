@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from shearline.deploy.commands import switches
 from shearline.deploy.exits import Exit
 from shearline.deploy.options import Subparsers, add_json, at_least, positive
 from shearline.protocol.errors import ConfigError
@@ -34,6 +35,7 @@ def register(commands: Subparsers) -> None:
     _register_fig3(kinds)
     _register_fig4(kinds)
     _register_lock(kinds)
+    switches.register(kinds)
 
 
 def _register_fig3(kinds: Subparsers) -> None:
@@ -121,11 +123,11 @@ def run_fig3(arguments: argparse.Namespace) -> int:
     if not arguments.no_picture:
         from shearline.studies import peaks_picture  # noqa: PLC0415 - with matplotlib
 
-        switches = SWITCHES.get(arguments.learner, {})
+        changed = SWITCHES.get(arguments.learner, {})
         said = ", ".join(
             [
                 arguments.learner,
-                *(f"{name} = {value}" for name, value in switches.items()),
+                *(f"{name} = {value}" for name, value in changed.items()),
                 f"seed {arguments.seed}",
             ]
         )
