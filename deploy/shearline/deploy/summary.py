@@ -56,7 +56,8 @@ def print_summary(summary: Mapping[str, Any], run_dir: Path, units: Mapping[str,
     for name, tried in CONFIRMATIONS.items():
         if summary.get(name):
             console.print(_confirmation(summary[name], tried))
-    console.print(f"\nreplay it in Rerun   {_ourselves()} view {run_dir}", soft_wrap=True)
+    console.print(f"\nlook at it in Rerun  {_ourselves()} view {run_dir}", soft_wrap=True)
+    console.print(f"run a trial again    {_ourselves()} replay {run_dir} --trial 0", soft_wrap=True)
     console.print(f"list its trials      {_ourselves()} trials {run_dir} --json", soft_wrap=True)
 
 

@@ -109,7 +109,8 @@ def _changes(replayed: Replayed, change: Change) -> Iterator[str]:
     space = replayed.case.task.space
     recorded = dict(zip(space, replayed.case.theta, strict=True))
     for name, value in change.values.items():
-        yield f"with {name} {value:g} {space[name][0]} instead of {recorded[name]:.6g}"
+        here = f"{value:g} {space[name][0]}".rstrip()
+        yield f"with {name} {here} instead of {recorded[name]:.6g}"
     if change.seed is not None:
         yield f"with seed {change.seed} instead of {replayed.case.seed}"
 

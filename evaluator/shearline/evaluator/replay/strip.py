@@ -58,7 +58,7 @@ def said(replayed: Replayed, speed: float) -> tuple[str, str]:
     why = f" ({verdict.why})" if verdict.why else ""
     triples = zip(space.items(), replayed.theta, replayed.case.theta, strict=True)
     changes = [
-        f"{name} {value:.4g} {unit} instead of {recorded:.4g}"
+        f"{name} {f'{value:.4g} {unit}'.rstrip()} instead of {recorded:.4g}"
         for (name, (unit, _, _)), value, recorded in triples
         if value != recorded
     ]

@@ -138,7 +138,7 @@ def _other(replayed: Replayed, recorded: Counted, spec: TaskSpec) -> str:
 
 def _same_but_different(replayed: Replayed) -> str:
     """Say what may be behind a difference where task and engine are the same."""
-    if replayed.case.contradiction():
+    if replayed.case.contradiction() or replayed.case.digest == replayed.digest:
         return "the record was changed after the run"
     return (
         f"the engine is the same ({replayed.engine}), so the record was changed, or this processor"
