@@ -35,6 +35,10 @@ class TestPSPPaper(Shipped):
     name = "psp-paper"
 
 
+class TestPSPRanked(Shipped):
+    name = "psp-ranked"
+
+
 class TestHiREPS(Shipped):
     name = "hireps"
 
