@@ -22,10 +22,11 @@ pytestmark = [
 ]
 
 PHONE_PX = 390
-#: Elements that reach beyond the window, other than in what scrolls on its own.
+#: Elements that reach beyond their card or the window, other than in what scrolls on its own.
 BEYOND = """
-[...document.querySelectorAll('body *')]
-  .filter(e => !e.closest('.scroll, pre, svg') && e.getBoundingClientRect().right > innerWidth + 1)
+[...document.querySelectorAll('body *')].filter(e => !e.closest('.scroll, pre, svg, .tip'))
+  .filter(e => e.getBoundingClientRect().right
+    > (e.parentElement.closest('.card')?.getBoundingClientRect().right ?? innerWidth))
   .map(e => `${e.tagName}.${e.className} ${e.textContent.slice(0, 40)}`)
 """
 

@@ -92,7 +92,7 @@ def picture(facts: Facts) -> Markup:
     if len(found) > LANES_MAX:
         most = sorted(found, key=lambda lane: -lane.busy_s())[:LANES_MAX]
         shown = sorted(most, key=lambda lane: lane.name)
-    axis = Axis(Scale(0.0, length_s), "time since the run began [s]")
+    axis = Axis(Scale(0.0, length_s), "time of the run [s]")
     rows = [_row(lane, axis, length_s) for lane in shown]
     present = {s.look for lane in shown for s in lane.stretches}
     keys = legend(*((look, words) for look, words in WORDS.items() if look in present))
