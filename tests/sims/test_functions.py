@@ -12,6 +12,7 @@ from shearline.sims.functions import (
     Array,
     centred,
     fragile_ridge,
+    noisy_sphere,
     optimum,
     rastrigin,
     ridge_cost,
@@ -109,3 +110,14 @@ def test_a_trial_fails_as_often_as_its_chance_says() -> None:
     outcomes = [problem.trial(theta, rng) for _ in range(2000)]
     assert np.mean([ok for _, ok in outcomes]) == pytest.approx(0.4, abs=0.04)
     assert {cost for cost, ok in outcomes if not ok} == {problem.failure_cost}
+
+
+@given(n=st.integers(1, 30), seed=st.integers(0, 100))
+def test_the_noisy_sphere_is_best_and_cheapest_at_its_optimum(n: int, seed: int) -> None:
+    problem = noisy_sphere(n, seed)
+    assert problem.success is not None
+    u = np.random.default_rng(seed).random((500, n))
+    cheapest = u[np.argmin(problem.cost(u))]
+    assert problem.success(cheapest) == problem.success(u).max()
+    assert np.all(problem.cost(u) >= 0.2)
+    assert np.all(problem.success(u) <= 0.97)

@@ -155,3 +155,26 @@ def centred(function: Callable[[Array], Array], n: int) -> Problem:
 def fragile_ridge(n: int = 23) -> Problem:
     """Return the ridge problem on the unit cube; about half of a latin hypercube succeeds."""
     return Problem("fragile ridge", Space.unit(n), ridge_cost, ridge_success, RIDGE_FAILURE_COST)
+
+
+def noisy_sphere(n: int, seed: int) -> Problem:
+    """Return a bowl on the unit cube whose trials fail the more often the farther out they are.
+
+    With ``d`` the root mean square over the axes of the distance from the seed's optimum in units
+    of .3, a trial succeeds with chance ``.97 / (1 + exp(-8 (1 - d)))`` and then costs
+    ``.2 + d^2``.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence([seed, n, 0x5F0E]))
+    at = rng.uniform(0.25, 0.75, n)
+
+    def distance(u: Array) -> Array:
+        offset: Array = np.sqrt(np.mean(np.square((u - at) / 0.3), axis=-1))
+        return offset
+
+    return Problem(
+        f"noisy sphere in {n}",
+        Space.unit(n),
+        lambda u: 0.2 + np.square(distance(u)),
+        lambda u: 0.97 / (1.0 + np.exp(-8.0 * (1.0 - distance(u)))),
+        RIDGE_FAILURE_COST,
+    )
