@@ -53,12 +53,20 @@ def print_summary(summary: Mapping[str, Any], run_dir: Path, units: Mapping[str,
     if summary.get("recommendation"):
         console.print(_recommendation(summary["recommendation"]))
         console.print(_tuple(summary["recommendation"], units))
-    for name, tried in CONFIRMATIONS.items():
-        if summary.get(name):
-            console.print(_confirmation(summary[name], tried))
+    for text in confirmations(summary):
+        console.print(f"\n{text}")
     console.print(f"\nlook at it in Rerun  {_ourselves()} view {run_dir}", soft_wrap=True)
     console.print(f"run a trial again    {_ourselves()} replay {run_dir} --trial 0", soft_wrap=True)
     console.print(f"list its trials      {_ourselves()} trials {run_dir} --json", soft_wrap=True)
+
+
+def confirmations(summary: Mapping[str, Any]) -> list[str]:
+    """Say what fresh trials came to, beside what was claimed: a text for each confirmation."""
+    return [
+        _confirmation(summary[name], tried)
+        for name, tried in CONFIRMATIONS.items()
+        if summary.get(name)
+    ]
 
 
 def _ourselves() -> str:
@@ -122,12 +130,11 @@ def _spread(region: Mapping[str, Any] | None, name: str) -> str:
 
 
 def _confirmation(said: Mapping[str, Any], tried: str) -> str:
-    """Say what fresh trials came to, beside what was claimed."""
     low, high = said["interval"]
     lost = f", {said['lost']} lost" if said["lost"] else ""
     verdict = "which bears out" if said["bears_out"] else "which does NOT bear out"
     return (
-        f"\nconfirmed: {tried} succeeded in {said['successes']} of {said['trials']} fresh trials"
+        f"confirmed: {tried} succeeded in {said['successes']} of {said['trials']} fresh trials"
         f"{lost}: {low:.2f} to {high:.2f} at 95 %,\n{verdict} the claim of at least"
         f" {said['claimed']:.2f}; mean cost {number(said['mean_cost'])}"
     )

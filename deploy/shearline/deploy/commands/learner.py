@@ -50,4 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"shearline: {summary.why}", file=sys.stderr, flush=True)
     if arguments.json:
         print(json.dumps(summary.to_dict()), flush=True)
+    elif summary.confirmation or summary.region_confirmation:
+        from shearline.deploy.summary import confirmations  # noqa: PLC0415 - loads rich
+
+        print("\n".join(confirmations(summary.to_dict())), flush=True)
     return {"complete": Exit.OK, "stopped": Exit.INTERRUPTED}.get(summary.state, Exit.RUN_FAILED)
