@@ -60,6 +60,7 @@ class Launch:
         evaluators: How many to start, 0 or more.
         task: What evaluators load (``file:function``), or ``None`` for the learner's own.
         learner_arguments: Further arguments of ``shearline learner``.
+        evaluator_arguments: The same of ``shearline evaluator``.
     """
 
     run_dir: Path
@@ -67,6 +68,7 @@ class Launch:
     evaluators: int
     task: str | None
     learner_arguments: list[str]
+    evaluator_arguments: list[str] = field(default_factory=list)
     _show: Show = field(init=False)
     _children: dict[str, Child] = field(default_factory=dict, init=False)
     _restarts: dict[str, int] = field(default_factory=dict, init=False)
@@ -105,7 +107,8 @@ class Launch:
         if name == "learner":
             return ["learner", *self.learner_arguments, "--listen", self.listen]
         task = ["--task", self.task] if self.task else []
-        return ["evaluator", "--connect", reach(self.listen), "--name", name, *task]
+        more = [*task, *self.evaluator_arguments]
+        return ["evaluator", "--connect", reach(self.listen), "--name", name, *more]
 
     def _start(self, name: str) -> None:
         log = self.run_dir / f"{name}.out"

@@ -66,6 +66,24 @@ def add_connect(command: argparse.ArgumentParser, *, patience_s: float = 5.0) ->
     )
 
 
+def add_traces(command: argparse.ArgumentParser) -> None:
+    """``--trace-hz`` and ``--no-traces``: what evaluators show of each trial."""
+    command.add_argument(
+        "--trace-hz",
+        type=seconds,
+        default=1000.0,
+        metavar="HZ",
+        help="samples of a trace per second of the trial's clock, at most (default 1000)",
+    )
+    command.add_argument("--no-traces", action="store_true", help="send no traces to the record")
+
+
+def trace_arguments(arguments: argparse.Namespace) -> list[str]:
+    """Return what :func:`add_traces` parsed, as arguments again, for a child process."""
+    rate = ["--trace-hz", str(arguments.trace_hz)]
+    return [*rate, "--no-traces"] if arguments.no_traces else rate
+
+
 def add_run(command: argparse.ArgumentParser) -> None:
     """Arguments that say what a run is; each overrides the TOML file, if one is given."""
     group = command.add_argument_group("the run")

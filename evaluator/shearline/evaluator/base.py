@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from shearline.protocol.errors import ShearlineError
 from shearline.protocol.messages import TaskSpec
+from shearline.protocol.pose import Placed
 
 Array = npt.NDArray[np.float64]
 
@@ -34,11 +35,13 @@ class Trace:
         columns: Name to ``(unit, values (samples,) float32)``; a name with a dot groups, e.g.
             ``"tip.x": ("m", ...)``.
         events: ``(t_s, name)`` of phase changes and verdicts, in order.
+        placed: Bodies of the scene whose place is this trial's own.
     """
 
     t_s: npt.NDArray[np.float32]
     columns: Mapping[str, tuple[str, npt.NDArray[np.float32]]]
     events: tuple[tuple[float, str], ...] = ()
+    placed: tuple[Placed, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

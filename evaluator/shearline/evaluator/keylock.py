@@ -22,6 +22,8 @@ from shearline.evaluator.keylock_spec import (
 )
 from shearline.evaluator.skill.parameters import parameters
 from shearline.protocol.messages import TaskSpec
+from shearline.protocol.pose import Placed
+from shearline.protocol.scene import SceneData
 
 if TYPE_CHECKING:
     from shearline.evaluator.skill.execute import Job
@@ -115,8 +117,17 @@ class KeylockTask:
                 "tilt_rad": float(np.linalg.norm(off[3:])),
             },
             why=semantic.VERDICTS[end.verdict],
-            trace=trace.trace(rows, end, TICK_S),
+            trace=trace.trace(rows, end, TICK_S, (_placed(setup),)),
         )
+
+    def scene(self) -> SceneData:
+        """Return what a trial looks like: the arm, the key, the lock and its pins."""
+        from shearline.evaluator.skill.trace import MOVED  # noqa: PLC0415
+        from shearline.sims.geometry import geometry  # noqa: PLC0415
+        from shearline.sims.lock import CUT  # noqa: PLC0415
+
+        text = self.plant.scene.mjcf()
+        return geometry(text, MOVED, tip_in="lock", front=CUT)
 
     def job(self, theta: Array) -> Job:
         """Return what a trial of ``theta (23,)`` is to do."""
@@ -142,6 +153,14 @@ class KeylockTask:
             depth_m=self.plant.scene.lock.depth_m,
             cost_per_m=COST_PER_M,
         )
+
+
+def _placed(setup: Setup) -> Placed:
+    """Return where the lock stands in one trial."""
+    from shearline.sims.scene import quaternion  # noqa: PLC0415
+
+    w, x, y, z = quaternion(setup.lock.rotation).tolist()
+    return Placed(body="lock", position=setup.lock.position.tolist(), quaternion=[x, y, z, w])
 
 
 def draw_setup(chosen: Level, seed: int) -> tuple[Setup, Array]:

@@ -41,24 +41,38 @@ def paths(scene: SceneData) -> dict[str, str]:
     return found
 
 
-def moving(scene: SceneData, columns: Mapping[str, Array]) -> Iterator[Motion]:
-    """Yield how each body moves whose column is there; the others stand where the scene says.
+def moving(scene: SceneData, columns: Mapping[str, Array]) -> list[Motion]:
+    """Return how each body moves whose column is there; the others stand where the scene says.
 
     Args:
         scene: What there is.
         columns: Column name to values ``(samples,)``, in rad or m.
     """
-    for body in scene.bodies:
-        values = columns.get(body.column)
-        if values is None or body.joint is Joint.FIXED:
-            continue
-        position = np.tile(np.array(body.position), (len(values), 1))
-        quaternion = np.tile(np.array(body.quaternion), (len(values), 1))
-        if body.joint is Joint.SLIDE:
-            position += np.outer(values, turned(body.quaternion, body.axis))
-        else:
-            quaternion = product(quaternion, about(body.axis, values))
-        yield Motion(body, position.astype(np.float32), quaternion.astype(np.float32))
+    free = [body for body in scene.bodies if body.column in columns]
+    hinges = [body for body in free if body.joint is Joint.HINGE]
+    slides = [body for body in free if body.joint is Joint.SLIDE]
+    motions = [_slid(body, columns[body.column]) for body in slides]
+    if hinges:
+        motions += _turned(hinges, np.stack([columns[body.column] for body in hinges]))
+    return motions
+
+
+def _slid(body: Body, shift_m: Array) -> Motion:
+    along = turned(body.quaternion, body.axis)
+    position = np.array(body.position) + np.outer(shift_m, along)
+    quaternion = np.tile(np.array(body.quaternion, dtype=np.float32), (len(shift_m), 1))
+    return Motion(body, position.astype(np.float32), quaternion)
+
+
+def _turned(bodies: list[Body], angle: Array) -> list[Motion]:
+    """Turn all bodies by ``angle (bodies, samples)`` [rad] at once."""
+    samples = angle.shape[1]
+    at_zero = np.repeat([body.quaternion for body in bodies], samples, axis=0)
+    axes = np.repeat([body.axis for body in bodies], samples, axis=0)
+    turns = product(at_zero, about(axes, angle.ravel())).astype(np.float32)
+    turns = turns.reshape(len(bodies), samples, 4)
+    places = [np.tile(np.array(body.position, dtype=np.float32), (samples, 1)) for body in bodies]
+    return [Motion(body, p, q) for body, p, q in zip(bodies, places, turns, strict=True)]
 
 
 def standing(scene: SceneData, placed: Sequence[Placed]) -> Iterator[Placed]:
@@ -70,11 +84,11 @@ def standing(scene: SceneData, placed: Sequence[Placed]) -> Iterator[Placed]:
 
 
 def about(axis: npt.ArrayLike, angle: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Return the quaternions ``(n, 4)`` of turns by ``angle (n,)`` [rad] about one axis."""
+    """Return the quaternions ``(n, 4)`` of turns by ``angle (n,)`` [rad] about ``axis (n, 3)``."""
     half = np.asarray(angle, dtype=np.float64) / 2.0
-    unit = np.asarray(axis, dtype=np.float64)
-    unit = unit / max(float(np.linalg.norm(unit)), 1e-12)
-    return np.concatenate([np.outer(np.sin(half), unit), np.cos(half)[:, None]], axis=1)
+    axes = np.asarray(axis, dtype=np.float64)
+    unit = axes / np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), 1e-12)
+    return np.concatenate([unit * np.sin(half)[:, None], np.cos(half)[:, None]], axis=1)
 
 
 def product(p: npt.ArrayLike, q: npt.ArrayLike) -> npt.NDArray[np.float64]:

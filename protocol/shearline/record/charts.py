@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -111,12 +112,20 @@ def telling(series: Sequence[npt.NDArray[np.float32]], n: int) -> npt.NDArray[np
     spread = np.ptp(values, axis=1, keepdims=True)
     scaled = values / np.where(spread > 0.0, spread, np.float32(1.0))
     width = -(-(samples - 1) // (n - 1))
-    n_bins = -(-(samples - 1) // width)
-    # the last bin is filled up with its own last value, which is never the first to be furthest
-    padded = np.pad(scaled[:, :-1], ((0, 0), (0, n_bins * width - (samples - 1))), mode="edge")
-    bins = padded.reshape(len(values), n_bins, width)
+    n_whole = (samples - 1) // width
+    whole = scaled[:, : n_whole * width].reshape(len(values), n_whole, width)
+    kept = [np.arange(n_whole) * width + _furthest(whole)]
+    rest = scaled[:, None, n_whole * width : -1]
+    if rest.size:
+        kept.append(n_whole * width + _furthest(rest))
+    return np.append(np.concatenate(kept), samples - 1)
+
+
+def _furthest(bins: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
+    """Return for bins ``(curves, bins, width)`` which sample is furthest from the mean."""
     away = np.abs(bins - bins.mean(axis=2, keepdims=True)).max(axis=0)
-    return np.append(np.arange(n_bins) * width + away.argmax(axis=1), samples - 1)
+    found: npt.NDArray[np.intp] = away.argmax(axis=1)
+    return found
 
 
 def nice_above(value: float) -> float:

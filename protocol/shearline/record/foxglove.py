@@ -22,17 +22,67 @@ TIP_AXES = ("tip.x", "tip.y", "tip.z")
 
 _TYPES = {
     "string": FieldDescriptorProto.TYPE_STRING,
+    "bool": FieldDescriptorProto.TYPE_BOOL,
     "double": FieldDescriptorProto.TYPE_DOUBLE,
     "fixed32": FieldDescriptorProto.TYPE_FIXED32,
 }
 _TIME = ".google.protobuf.Timestamp"
 
-#: Message to its fields in order of their numbers 1, 2, ...; ``[]`` marks a repeated one.
+#: Message to its fields in order of their numbers 1, 2, ...; ``[]`` marks a repeated one, an empty
+#: name a number that is not used here.
 _MESSAGES: dict[str, tuple[tuple[str, str], ...]] = {
     "Vector3": (("x", "double"), ("y", "double"), ("z", "double")),
     "Quaternion": (("x", "double"), ("y", "double"), ("z", "double"), ("w", "double")),
+    "Color": (("r", "double"), ("g", "double"), ("b", "double"), ("a", "double")),
     "Pose": (("position", ".foxglove.Vector3"), ("orientation", ".foxglove.Quaternion")),
     "PosesInFrame": (("timestamp", _TIME), ("frame_id", "string"), ("poses", ".foxglove.Pose[]")),
+    "FrameTransform": (
+        ("timestamp", _TIME),
+        ("parent_frame_id", "string"),
+        ("child_frame_id", "string"),
+        ("translation", ".foxglove.Vector3"),
+        ("rotation", ".foxglove.Quaternion"),
+    ),
+    "FrameTransforms": (("transforms", ".foxglove.FrameTransform[]"),),
+    "ArrowPrimitive": (
+        ("pose", ".foxglove.Pose"),
+        ("shaft_length", "double"),
+        ("shaft_diameter", "double"),
+        ("head_length", "double"),
+        ("head_diameter", "double"),
+        ("color", ".foxglove.Color"),
+    ),
+    "CubePrimitive": (
+        ("pose", ".foxglove.Pose"),
+        ("size", ".foxglove.Vector3"),
+        ("color", ".foxglove.Color"),
+    ),
+    "SpherePrimitive": (
+        ("pose", ".foxglove.Pose"),
+        ("size", ".foxglove.Vector3"),
+        ("color", ".foxglove.Color"),
+    ),
+    "CylinderPrimitive": (
+        ("pose", ".foxglove.Pose"),
+        ("size", ".foxglove.Vector3"),
+        ("bottom_scale", "double"),
+        ("top_scale", "double"),
+        ("color", ".foxglove.Color"),
+    ),
+    # the primitives of a later number are not used here; whoever reads us finds none of them
+    "SceneEntity": (
+        ("timestamp", _TIME),
+        ("frame_id", "string"),
+        ("id", "string"),
+        ("", ""),
+        ("frame_locked", "bool"),
+        ("", ""),
+        ("arrows", ".foxglove.ArrowPrimitive[]"),
+        ("cubes", ".foxglove.CubePrimitive[]"),
+        ("spheres", ".foxglove.SpherePrimitive[]"),
+        ("cylinders", ".foxglove.CylinderPrimitive[]"),
+    ),
+    "SceneUpdate": (("", ""), ("entities", ".foxglove.SceneEntity[]")),
     "Log": (
         ("timestamp", _TIME),
         ("level", ".foxglove.Log.Level"),
@@ -63,7 +113,8 @@ def foxglove_file() -> FileDescriptorProto:
     for name, fields in _MESSAGES.items():
         message = file.message_type.add(name=name)
         for number, (field_name, kind) in enumerate(fields, start=1):
-            _set_type(message.field.add(name=field_name, number=number), kind)
+            if field_name:
+                _set_type(message.field.add(name=field_name, number=number), kind)
         if name == "Log":
             levels = message.enum_type.add(name="Level")
             for level in Level:
@@ -74,14 +125,14 @@ def foxglove_file() -> FileDescriptorProto:
 def log_line(level: Level, text: str, at_ns: int) -> dict[str, Any]:
     """Return the values of one ``foxglove.Log``, said at ``at_ns`` [ns since the epoch]."""
     return {
-        "timestamp": _time(at_ns),
+        "timestamp": timestamp(at_ns),
         "level": int(level),
         "message": text,
         "name": "recorder",
     }
 
 
-def tip_path(trace: TraceData, at_ns: int) -> dict[str, Any] | None:
+def tip_path(trace: TraceData, at_ns: int, frame: str = "world") -> dict[str, Any] | None:
     """Return the values of a ``foxglove.PosesInFrame``, or ``None`` if the trace has no tip."""
     if not set(TIP_AXES) <= set(trace.names) or not trace.samples:
         return None
@@ -89,14 +140,15 @@ def tip_path(trace: TraceData, at_ns: int) -> dict[str, Any] | None:
     path = columns[[trace.names.index(axis) for axis in TIP_AXES]]
     thin = path[:, :: -(-trace.samples // TIP_POSES_MAX)].astype(float)
     poses = [_pose(x, y, z) for x, y, z in thin.T.tolist()]
-    return {"timestamp": _time(at_ns), "frame_id": "world", "poses": poses}
+    return {"timestamp": timestamp(at_ns), "frame_id": frame, "poses": poses}
 
 
 def _pose(x: float, y: float, z: float) -> Mapping[str, Any]:
     return {"position": {"x": x, "y": y, "z": z}, "orientation": {"w": 1.0}}
 
 
-def _time(at_ns: int) -> dict[str, int]:
+def timestamp(at_ns: int) -> dict[str, int]:
+    """Return the values of a ``google.protobuf.Timestamp`` [ns since the epoch]."""
     return {"seconds": at_ns // 10**9, "nanos": at_ns % 10**9}
 
 

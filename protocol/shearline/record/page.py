@@ -16,10 +16,11 @@ from shearline.protocol.messages import Counted
 from shearline.protocol.scene import SceneData
 from shearline.record import columns
 from shearline.record.card import card
+from shearline.record.goal import Goal
 from shearline.record.palette import COLOURS, series
 from shearline.record.reader import Trace
 from shearline.record.sheet import Sheet, Times
-from shearline.record.space import Lock, Space
+from shearline.record.space import Space
 from shearline.record.topics import RunConfig
 
 #: Roots of the pages, in the order in which trials are asked for.
@@ -46,7 +47,7 @@ def draw_page(
         settings = tomllib.loads(config.text) if config else {}
         trace = traces[-1]
         _signals(sheet, root, trace, columns.limits_of(settings))
-        space = Space(sheet, f"{root}/scene", scene, Lock.of(settings))
+        space = Space(sheet, f"{root}/scene", scene, Goal.of(settings))
         _in_space(space, outcome, trace)
     sheet.flush()
 

@@ -25,13 +25,14 @@ from shearline.protocol.messages import (
 from shearline.protocol.scene import SceneData
 from shearline.record import charts, columns
 from shearline.record.card import card
+from shearline.record.goal import Goal
 from shearline.record.palette import BLUE, COLOURS, GREEN, RED
 from shearline.record.panels import Panels
 from shearline.record.played import Played
 from shearline.record.reader import Trace
 from shearline.record.sheet import Sheet, Times
 from shearline.record.slices import Slices
-from shearline.record.space import Lock, Space
+from shearline.record.space import Space
 from shearline.record.topics import RunConfig
 
 #: Points of all trials' curves together that a viewer shows without a pause: with more trials,
@@ -70,7 +71,7 @@ class Picture:
         self._outcomes: dict[int, OutcomeKind | None] = {}
         self._tuples: dict[tuple[str, tuple[str, ...], int], list[list[float]]] = {}
         self._last_trial = 0
-        self._goal = Lock.of(settings)
+        self._goal = Goal.of(settings)
         self._panels = Panels(self._sheet)
         self._slices = Slices(self._sheet, config)
         self._styles()

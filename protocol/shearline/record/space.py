@@ -8,8 +8,6 @@ the lock is a plain block.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +16,7 @@ import rerun as rr
 from shearline.protocol.pose import Placed
 from shearline.protocol.scene import Body, SceneData, Shape, ShapeKind
 from shearline.record.bodies import Motion, moving, paths, standing, turned
+from shearline.record.goal import Goal
 from shearline.record.palette import BLUE, ORANGE, packed
 from shearline.record.sheet import Sheet, Times
 
@@ -32,29 +31,6 @@ LOCK_HALF_M = (0.006, 0.010)
 BRIGHT = (255, 230, 120)
 
 
-@dataclass(frozen=True, slots=True)
-class Lock:
-    """Where the tip is to go, in the frame of the lock.
-
-    Attributes:
-        depth_m: Depth that counts as inserted [m].
-        roi_m: Radius of the region of interest around it [m].
-    """
-
-    depth_m: float
-    roi_m: float
-
-    @classmethod
-    def of(cls, settings: Mapping[str, Any]) -> Lock | None:
-        """Return what a run's settings say of the lock, or ``None`` if they say nothing."""
-        task = settings.get("task", {})
-        options = task.get("options", {}) if isinstance(task, Mapping) else {}
-        depth_m, roi_m = options.get("depth_m"), options.get("roi_m")
-        if not isinstance(depth_m, float) or not isinstance(roi_m, float):
-            return None
-        return cls(depth_m, roi_m)
-
-
 class Space:
     """The entities below one root.
 
@@ -62,14 +38,14 @@ class Space:
         sheet: Where rows go.
         root: Entity below which everything stands.
         scene: What there is to see, if the record knows.
-        lock: Where the tip is to go, if the run says.
+        goal: Where the tip is to go, if the run says.
     """
 
-    def __init__(self, sheet: Sheet, root: str, scene: SceneData | None, lock: Lock | None) -> None:
+    def __init__(self, sheet: Sheet, root: str, scene: SceneData | None, goal: Goal | None) -> None:
         self.root = root
         self._sheet = sheet
         self._scene = scene
-        self._lock = lock
+        self._goal = goal
         self._free: set[str] | None = None
         self._moved: set[str] = set()
         self._has_goal = False
@@ -165,10 +141,10 @@ class Space:
 
     def goal(self) -> None:
         """Draw once where the tip is to go: the region of interest, and a lock if none is known."""
-        if self._lock is None or self._has_goal:
+        if self._goal is None or self._has_goal:
             return
         self._has_goal = True
-        depth_m, roi_m = self._lock.depth_m, self._lock.roi_m
+        depth_m, roi_m = self._goal.depth_m, self._goal.roi_m
         if self._scene is None:
             block = rr.Boxes3D(
                 centers=[(0.0, 0.0, depth_m / 2.0)],

@@ -14,6 +14,9 @@ from shearline.protocol.scene import SceneData
 RUN = "/run"
 LOG = "/log"
 TIP = "/trial/tip"
+SCENE = "/scene"
+TF = "/tf"
+TF_FIXED = "/tf_static"
 
 
 class RunConfig(Message, frozen=True, kw_only=True, tag="run"):
@@ -81,4 +84,9 @@ TOPICS: dict[type[Message], Topic] = {
 #: Topics of standard types, readable in 3-D and log panels without our code.
 LOG_TOPIC = Topic(LOG, "foxglove.Log", "what the recorder has to say")
 TIP_TOPIC = Topic(TIP, "foxglove.PosesInFrame", "path of the tip of one trial, thinned; in m")
-STANDARD = (LOG_TOPIC, TIP_TOPIC)
+SCENE_TOPIC = Topic(SCENE, "foxglove.SceneUpdate", "bodies in their own frames; in m")
+TF_TOPIC = Topic(
+    TF, "foxglove.FrameTransforms", "where bodies are, trial after trial, each in the time it took"
+)
+FIXED_TOPIC = Topic(TF_FIXED, "foxglove.FrameTransforms", "where bodies are that do not move")
+STANDARD = (LOG_TOPIC, TIP_TOPIC, SCENE_TOPIC, TF_TOPIC, FIXED_TOPIC)

@@ -12,6 +12,7 @@ import contextlib
 import fcntl
 import os
 import sys
+import tomllib
 import zlib
 from collections import defaultdict
 from collections.abc import Callable, Mapping
@@ -26,10 +27,24 @@ from mcap.writer import CompressionType, Writer
 from shearline.protocol import messages
 from shearline.protocol.errors import RecordError
 from shearline.protocol.messages import TraceData
+from shearline.protocol.scene import SceneData
 from shearline.record import foxglove, schemas
+from shearline.record.entities import scene_update
+from shearline.record.goal import Goal
 from shearline.record.parts import create_next
 from shearline.record.seal import seal
-from shearline.record.topics import LOG_TOPIC, STANDARD, TIP_TOPIC, TOPICS, RunConfig, Topic
+from shearline.record.topics import (
+    FIXED_TOPIC,
+    LOG_TOPIC,
+    SCENE_TOPIC,
+    STANDARD,
+    TF_TOPIC,
+    TIP_TOPIC,
+    TOPICS,
+    RunConfig,
+    Topic,
+)
+from shearline.record.transforms import ROOT, fixed_transforms, motion
 
 #: A chunk closes at this size or age; age bounds what a kill loses, size bounds memory.
 CHUNK_BYTES = 2**20
@@ -66,7 +81,9 @@ class RecordWriter:
         self._config = config
         self._part_bytes_max = part_bytes_max
         self._complain = complain or _to_stderr
-        self._last_ns = 0
+        self._last_ns: defaultdict[str, int] = defaultdict(int)
+        self._scene: SceneData | None = None
+        self._goal = Goal.of(tomllib.loads(config.text))
         self._flushed_ns = 0
         self._sequences: defaultdict[str, int] = defaultdict(int)
         self._reserve = run_dir / ".record-reserve"
@@ -87,7 +104,8 @@ class RecordWriter:
         """Write one message.
 
         Args:
-            message: Of a recorded type; a trace with a tip also draws its path.
+            message: Of a recorded type; a trace with a tip also draws its path, and moves the
+                bodies of the scene. A scene that is known already is not written again.
             log_ns: When it was received [ns since the epoch]; never runs backwards on record.
             publish_ns: When it was said, if known [ns since the epoch].
 
@@ -96,10 +114,14 @@ class RecordWriter:
         """
         if type(message) not in TOPICS:
             raise RecordError(f"messages of type {type(message).__name__} are not recorded")
-        topic = TOPICS[type(message)]
-        self._put(topic, schemas.encode(message), log_ns, publish_ns)
-        if isinstance(message, TraceData) and (tip := foxglove.tip_path(message, log_ns)):
-            self._put_standard(TIP_TOPIC, tip, log_ns)
+        if isinstance(message, SceneData):
+            if message != self._scene:
+                self._scene = message
+                self._put_scene(message, log_ns)
+            return
+        self._put(TOPICS[type(message)], schemas.encode(message), log_ns, publish_ns)
+        if isinstance(message, TraceData):
+            self._put_motion(message, log_ns)
 
     def log(self, level: foxglove.Level, text: str, *, log_ns: int) -> None:
         """Write one line to the record's own log."""
@@ -130,23 +152,36 @@ class RecordWriter:
     ) -> None:
         self.close()
 
+    def _put_scene(self, scene: SceneData, log_ns: int) -> None:
+        self._put(TOPICS[SceneData], schemas.encode(scene), log_ns, log_ns)
+        self._put_standard(SCENE_TOPIC, scene_update(scene, self._goal, log_ns), log_ns)
+        self._put(FIXED_TOPIC, fixed_transforms(scene, log_ns), log_ns, log_ns)
+
+    def _put_motion(self, trace: TraceData, log_ns: int) -> None:
+        """Write a trace's path and motion in types that other tools can draw."""
+        frame = self._scene.tip_in if self._scene else ""
+        if tip := foxglove.tip_path(trace, log_ns, frame or ROOT):
+            self._put_standard(TIP_TOPIC, tip, log_ns)
+        if self._scene is not None:
+            for at_ns, data in motion(self._scene, trace, self._last_ns[TF_TOPIC.name], log_ns):
+                self._put(TF_TOPIC, data, at_ns, at_ns)
+
     def _put_standard(self, topic: Topic, values: Mapping[str, Any], log_ns: int) -> None:
         self._put(topic, schemas.encode_standard(topic.schema, values), log_ns, log_ns)
 
     def _put(self, topic: Topic, data: bytes, log_ns: int, publish_ns: int | None) -> None:
-        self._last_ns = max(self._last_ns, log_ns)
-        published = self._last_ns if publish_ns is None else publish_ns
+        at_ns = self._last_ns[topic.name] = max(self._last_ns[topic.name], log_ns)
+        published = at_ns if publish_ns is None else publish_ns
         sequence = self._sequences[topic.name]
         self._sequences[topic.name] = (sequence + 1) % 2**32
-        self._guarded(
-            lambda: self._part.add(topic, data, self._last_ns, max(published, 0), sequence)
-        )
+        self._guarded(lambda: self._part.add(topic, data, at_ns, max(published, 0), sequence))
 
     def _begin(self) -> None:
         now_ns = int(self._config.at_s * 1e9)
         head = schemas.encode(self._config)
-        self._last_ns = max(self._last_ns, now_ns)
-        self._part.add(TOPICS[RunConfig], head, self._last_ns, now_ns, 0)
+        self._part.add(TOPICS[RunConfig], head, now_ns, now_ns, 0)
+        if self._scene is not None:
+            self._put_scene(self._scene, max(now_ns, *self._last_ns.values()))
         self._part.flush()
 
     def _rotate(self) -> None:
@@ -170,8 +205,9 @@ class RecordWriter:
         )
         with contextlib.suppress(OSError):
             self._reserve.unlink(missing_ok=True)
-        line = foxglove.log_line(foxglove.Level.ERROR, self.stopped, self._last_ns)
-        self._part.abandon(schemas.encode_standard(LOG_TOPIC.schema, line), self._last_ns)
+        at_ns = max(self._last_ns.values(), default=0)
+        line = foxglove.log_line(foxglove.Level.ERROR, self.stopped, at_ns)
+        self._part.abandon(schemas.encode_standard(LOG_TOPIC.schema, line), at_ns)
         self._complain(self.stopped)
 
 

@@ -19,6 +19,10 @@ Triple = tuple[float, float, float]
 #: Pins of the lock.
 PINS = 5
 
+#: Walls that hide key and pins from an eye on the side of positive x: the lock cut open is
+#: drawn without them.
+CUT = ("wall_xp", "face_xp", "edge_xp")
+
 
 @dataclass(frozen=True, slots=True)
 class Box:

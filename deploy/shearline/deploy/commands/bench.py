@@ -43,6 +43,27 @@ def register(commands: Subparsers) -> None:
     add_json(transport)
     transport.set_defaults(handler=bench_transport)
 
+    record = kinds.add_parser("record", help="a key-lock run with and without its record, in turns")
+    record.add_argument("--rounds", type=positive, default=5, help="pairs of runs (default 5)")
+    record.add_argument("--trials", type=positive, default=100, help="per run (default 100)")
+    add_json(record)
+    record.set_defaults(handler=bench_record)
+
+
+def bench_record(arguments: argparse.Namespace) -> int:
+    """Print what recording costs a key-lock run."""
+    from shearline.deploy.record_bench import measure  # noqa: PLC0415 - loads zenoh
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    figures = measure(arguments.rounds, trials=arguments.trials, say=say)
+    if arguments.json:
+        return _print([figures], as_json=True, single=True)
+    for name, value in figures.items():
+        print(f"{name:24} {_short(value)}")
+    return Exit.OK
+
 
 def bench_sim(arguments: argparse.Namespace) -> int:
     """Print how close a trial comes to the bare engine, and to real time."""

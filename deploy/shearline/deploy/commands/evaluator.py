@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 
-from shearline.deploy.options import Subparsers, add_connect, positive
+from shearline.deploy.options import Subparsers, add_connect, add_traces, positive
 
 
 def register(commands: Subparsers) -> None:
@@ -22,7 +22,7 @@ def register(commands: Subparsers) -> None:
     command.add_argument("--plant", choices=("mujoco",), default="mujoco", help="what to act on")
     command.add_argument("--credits", type=positive, default=2, help="trials held at once")
     command.add_argument("--forever", action="store_true", help="wait for the next run too")
-    command.add_argument("--no-traces", action="store_true", help="send no traces to the record")
+    add_traces(command)
     command.set_defaults(handler=run)
 
 
@@ -45,6 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         wait_s=None if arguments.forever else arguments.patience,
         forever=arguments.forever,
         traces=not arguments.no_traces,
+        trace_hz=arguments.trace_hz,
     )
     end = run_worker(config, load_task(arguments.task) if arguments.task else None)
     print(f"shearline: {end.why}", file=sys.stderr, flush=True)

@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shearline.deploy.exits import Exit
-from shearline.deploy.options import Subparsers, add_json, add_run, at_least, run_arguments
+from shearline.deploy.options import (
+    Subparsers,
+    add_json,
+    add_run,
+    add_traces,
+    at_least,
+    run_arguments,
+    trace_arguments,
+)
 
 if TYPE_CHECKING:
     from shearline.deploy.launch import Launch
@@ -30,6 +38,7 @@ def register(commands: Subparsers) -> None:
         metavar="ENDPOINT",
         help="let others attach (default: a free port, this machine)",
     )
+    add_traces(command)
     add_json(command)
     command.set_defaults(handler=run)
 
@@ -47,6 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
         listen=check_endpoint(arguments.listen or free_endpoint()),
         evaluators=arguments.evaluators,
         task=asked.own_task,
+        evaluator_arguments=trace_arguments(arguments),
         learner_arguments=[*run_arguments(arguments), "--out", str(asked.run_dir)],
     )
     summary = _launched(launch, as_json=arguments.json)

@@ -13,6 +13,7 @@ import numpy as np
 from shearline.evaluator.base import Trace
 from shearline.evaluator.skill.semantic import PHASES, VERDICTS, Decision
 from shearline.evaluator.skill.skill import State
+from shearline.protocol.pose import Placed
 from shearline.sims.compiled import compiled
 from shearline.sims.lock import PINS
 from shearline.sims.panda import JOINTS, Array
@@ -42,6 +43,12 @@ COLUMNS: tuple[tuple[str, str], ...] = (
     ("phase", ""),
     *((f"pin.{i + 1}", "m") for i in range(PINS)),
 )
+
+#: Joint of the scene to the column that moves it.
+MOVED = {
+    **{f"link{j + 1}": f"q.{j + 1}" for j in range(JOINTS)},
+    **{f"pin{i}": f"pin.{i + 1}" for i in range(PINS)},
+}
 
 #: Columns before the tip's.
 _TIP = 4 * JOINTS
@@ -81,12 +88,12 @@ def digest(rows: Array) -> str:
     return hashlib.sha256(np.ascontiguousarray(rows).tobytes()).hexdigest()[:32]
 
 
-def trace(rows: Array, end: Decision, tick_s: float) -> Trace:
+def trace(rows: Array, end: Decision, tick_s: float, placed: tuple[Placed, ...] = ()) -> Trace:
     """Return the rows ``(ticks, columns)`` as a trace with named columns and events."""
     values = np.ascontiguousarray(rows.T, dtype=np.float32)
     t_s = np.arange(len(rows), dtype=np.float32) * np.float32(tick_s)
     columns = {name: (unit, values[i]) for i, (name, unit) in enumerate(COLUMNS)}
-    return Trace(t_s=t_s, columns=columns, events=_events(rows, end, tick_s))
+    return Trace(t_s=t_s, columns=columns, events=_events(rows, end, tick_s), placed=placed)
 
 
 def _events(rows: Array, end: Decision, tick_s: float) -> tuple[tuple[float, str], ...]:
