@@ -74,9 +74,7 @@ class _Reader:
         own = self.classes.get((element.attrib.get("class", "main"), element.tag), {})
         return {**own, **element.attrib}
 
-    def _body(
-        self, element: ET.Element, name: str, parent: str, seen: list[_Attributes]
-    ) -> Body:
+    def _body(self, element: ET.Element, name: str, parent: str, seen: list[_Attributes]) -> Body:
         found = element.find("joint")
         joint = {} if found is None else self._whole(found)
         column = self.columns.get(joint.get("name", ""), "")
