@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import signal
+import subprocess
+import sys
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -21,6 +26,18 @@ from shearline.evaluator import task
 def fatal(theta, rng):
     if os.path.exists("now"):
         os._exit(1)
+    return theta["x"], True
+"""
+
+ENDLESS = """
+import os, threading
+from shearline.evaluator import task
+
+@task(space={"x": ("m", -5.0, 5.0)})
+def endless(theta, rng):
+    if os.path.exists("now"):
+        print("begun", flush=True)
+        threading.Event().wait()
     return theta["x"], True
 """
 
@@ -66,3 +83,47 @@ def test_a_process_that_is_killed_is_one_sentence(
     with pytest.raises(WorkerDied, match="fewer --workers"):
         list(verify_all("fatal_task:fatal", Recorded(run).cases(), workers=2))
     assert not multiprocessing.active_children()
+
+
+def _until_all_closed(pipe: IO[str]) -> str:
+    """Read until nobody holds the other end any more."""
+    return pipe.read()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_however_it_is_ended_no_process_stays(
+    how: signal.Signals,
+    record: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    name = f"endless_{how.name.lower()}"
+    (tmp_path / f"{name}.py").write_text(ENDLESS)
+    run_dir = record(tmp_path / "run", f"{name}:endless")
+    (tmp_path / "now").touch()
+    command = ["replay", str(run_dir), "--all", "--verify", "--workers", "2"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "shearline.deploy", *command, "--task", f"{name}:endless"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert process.stdout is not None
+    assert process.stderr is not None
+    with process:
+        assert process.stderr.readline() == "begun\n"
+        if how is signal.SIGINT:
+            os.killpg(process.pid, how)  # as a terminal does: to the whole group
+        else:
+            process.kill()
+        # The workers, in their endless trials, hold these pipes as long as they live.
+        assert _until_all_closed(process.stdout) == ""
+        said = _until_all_closed(process.stderr)
+    if how is signal.SIGINT:
+        assert process.returncode == 130
+        assert said.splitlines()[-1] == "shearline: interrupted"
+        assert "Traceback" not in said

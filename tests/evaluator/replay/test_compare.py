@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from shearline.evaluator.base import Trace
 from shearline.evaluator.replay.compare import alignment, bits, compare, first_difference
+from shearline.protocol.pose import Placed
 
 SAMPLES = 40
 NAMES = ("t_s", "q.1", "depth", "push")
@@ -132,6 +133,19 @@ def test_the_words_name_channel_time_amount_and_both_values() -> None:
 )
 def test_other_events_and_channels_are_said(other: Trace, said: str) -> None:
     assert said in compare(trace(), other)
+
+
+def test_a_body_that_stood_elsewhere_is_said_where_the_record_has_it() -> None:
+    here = Placed(body="lock", position=[0.5, 0.0, 0.3], quaternion=[0.0, 0.0, 0.0, 1.0])
+    there = Placed(body="lock", position=[0.5, 0.0, 0.31], quaternion=[0.0, 0.0, 0.0, 1.0])
+    placed = replace(trace(), placed=(here,))
+    assert compare(placed, placed) == ""
+    assert compare(trace(), placed) == ""
+    assert (
+        compare(replace(trace(), placed=(there,)), placed)
+        == "lock stood elsewhere on record than here"
+    )
+    assert "lock stood elsewhere" in compare(placed, trace())
 
 
 def test_an_empty_trace_is_the_same_as_an_empty_one() -> None:

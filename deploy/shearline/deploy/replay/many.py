@@ -51,11 +51,25 @@ def verify_all(name: str, cases: Iterable[Case], workers: int) -> Iterator[Verif
     waiting: deque[Future[Verification]] = deque()
     with pool, _ended_early():
         for case in cases:
-            waiting.append(pool.submit(_verify, name, case))
+            with _deaf():
+                waiting.append(pool.submit(_verify, name, case))
             if len(waiting) >= AHEAD * workers:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
+
+
+@contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """Let what is started meanwhile never hear Ctrl-C, from its first instruction on.
+
+    A terminal sends it to every process; the parent hears it for all, and ends them.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager
@@ -83,7 +97,6 @@ def _verify(name: str, case: Case) -> Verification:
 
 
 def _begin(parent: int) -> None:
-    """Tie this process to its parent, who also hears Ctrl-C for it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Tie the life of this process to its parent's."""
     os.environ[PARENT_VARIABLE] = str(parent)
     die_with_parent()

@@ -131,7 +131,9 @@ class Recorded:
         if len(traces) > 1 and outcome is not None:
             ours = (outcome.engine, None)
             traces = [trace for trace in traces if self._engines.get(trace.token) in ours]
-        return tuple(base.Trace(trace.t_s, trace.columns, trace.events) for trace in traces)
+        return tuple(
+            base.Trace(trace.t_s, trace.columns, trace.events, trace.placed) for trace in traces
+        )
 
     @cached_property
     def _engines(self) -> dict[str, str]:

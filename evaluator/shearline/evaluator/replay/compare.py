@@ -61,7 +61,7 @@ def compare(recorded: Trace, replayed: Trace) -> str:
     found = first_difference(recorded, replayed, kept)
     if found:
         return str(found)
-    return _other_events(recorded, replayed)
+    return _other_events(recorded, replayed) or _other_places(recorded, replayed)
 
 
 def first_difference(recorded: Trace, replayed: Trace, kept: Index) -> Difference | None:
@@ -146,3 +146,12 @@ def _other_events(recorded: Trace, replayed: Trace) -> str:
         if (was_s, name) != (at_s, other):
             return f"the event {name} at {was_s:.4f} s on record is {other} at {at_s:.4f} s here"
     return f"{len(was)} events are on record, {len(found)} here"
+
+
+def _other_places(recorded: Trace, replayed: Trace) -> str:
+    """Older records do not say where bodies stood; those that do must be right."""
+    here = {placed.body: placed for placed in replayed.placed}
+    for placed in recorded.placed:
+        if here.get(placed.body) != placed:
+            return f"{placed.body} stood elsewhere on record than here"
+    return ""
