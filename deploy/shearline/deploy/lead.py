@@ -1,7 +1,9 @@
 """A learner and the recorder beside it: the two processes that every run has.
 
-The recorder is a client like any other. Trials wait for it to be ready, for a moment; after that
-the learner never looks at it again until the run has ended.
+The recorder is a client like any other. The trials of a new run wait for it to be ready, for a
+moment; those of a run that goes on do not: what was said while there was no learner is missed
+anyhow, and the journal has it. After that the learner never looks at it again until the run has
+ended.
 """
 
 from __future__ import annotations
@@ -22,8 +24,6 @@ from shearline.learner.run.summary import RunSummary
 from shearline.protocol.endpoints import check_endpoint
 from shearline.protocol.errors import RecordError
 from shearline.protocol.messages import Counted, EpisodeClosed
-from shearline.record.complete import complete
-from shearline.record.recorder import spawn
 
 #: A recorder starts within a second; a run does not wait longer than this for it [s].
 READY_S = 10.0
@@ -48,22 +48,38 @@ def lead(
     """
     settings = {"connect/endpoints": [check_endpoint(through)]} if through else None
     recorder: list[subprocess.Popen[str]] = []
+    is_new = not (run_dir / JOURNAL).exists()
+    starting = threading.Thread(
+        target=lambda: recorder.append(_started(listen, run_dir)), name="recorder-start"
+    )
 
     def begin() -> None:
         if config.record:
-            recorder.append(spawn(reach(listen), run_dir.resolve().name, run_dir))
-            _wait_until_ready(recorder[0])
+            starting.start()
+        if config.record and is_new:
+            starting.join()
 
     try:
         summary = serve(
             config, run_dir, listen, resume=resume, on_listening=begin, settings=settings
         )
     finally:
+        if starting.ident is not None:
+            starting.join()
         for process in recorder:
             _finish(process)
     if config.record:
         _complete(run_dir)
     return summary
+
+
+def _started(listen: str, run_dir: Path) -> subprocess.Popen[str]:
+    """Start a recorder and return it once it is ready, or will not be."""
+    from shearline.record.recorder import spawn  # noqa: PLC0415 - loads the formats of records
+
+    recorder = spawn(reach(listen), run_dir.resolve().name, run_dir)
+    _wait_until_ready(recorder)
+    return recorder
 
 
 def _wait_until_ready(recorder: subprocess.Popen[str]) -> None:
@@ -91,6 +107,8 @@ def _finish(recorder: subprocess.Popen[str]) -> None:
 
 def _complete(run_dir: Path) -> None:
     """Put into the record what the journal has and it has not; a full disk is not a lost run."""
+    from shearline.record.complete import complete  # noqa: PLC0415 - as above
+
     try:
         missing = complete(run_dir, outcomes(run_dir))
     except (RecordError, OSError) as error:
