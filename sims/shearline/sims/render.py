@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shearline.protocol.errors import ShearlineError
+from shearline.sims.lock import CUT
 from shearline.sims.panda import Array
 
 if TYPE_CHECKING:
@@ -29,9 +30,6 @@ if TYPE_CHECKING:
     from shearline.sims.plant import Setup
 
 Image = npt.NDArray[np.uint8]
-
-#: Sides of the lock that are left out when it is cut open: those towards the camera.
-_CUT = ("wall_xp", "face_xp", "edge_xp")
 
 _BACKENDS = (("egl", "EGL"), ("osmesa", "OSMesa"))
 
@@ -113,7 +111,7 @@ class Stage:
         self._plant = plant
         self._camera = camera
         self._view, self._options = _view(camera)
-        self._hidden = {plant.model.geom(name).id for name in _CUT} if camera.cut else set()
+        self._hidden = {plant.model.geom(name).id for name in CUT} if camera.cut else set()
         try:
             self._renderer = mujoco.Renderer(plant.model, height, width)
         except Exception as error:
