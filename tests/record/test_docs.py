@@ -14,7 +14,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "record.md").read_text(encoding="ut
 SNIPPETS = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
 
 
-@pytest.mark.parametrize("snippet", SNIPPETS, ids=["ours", "plain"])
+@pytest.mark.parametrize("snippet", SNIPPETS, ids=["columns", "rows", "plain"])
 def test_a_snippet_runs_as_it_stands(
     snippet: str, write_run: Callable[..., Path], tmp_path: Path
 ) -> None:

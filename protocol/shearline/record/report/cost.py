@@ -28,15 +28,18 @@ def picture(facts: Facts) -> Markup:
     up = y.scale.place(np.nan_to_num(table["cost"]))
     lost, fresh = facts.lost, ~facts.learning & np.isfinite(table["cost"])
     best = best_so_far(table["cost"], facts.success)
-    seen = np.isfinite(best)
+    seen = np.isfinite(best) & facts.learning
+    best_line = marks.steps(across[seen], y.scale.place(best[seen]))
+    refuted = fresh & ~table["success"]
     layers = [
         *_dots(facts, across, up, facts.failure, "bad"),
         path("hole", marks.dots(across[facts.failure], up[facts.failure])),
         *_dots(facts, across, up, facts.success, "ok"),
         *_dots(facts, across, up, fresh, "fresh"),
+        path("hole", marks.dots(across[refuted], up[refuted])),
         path("lost", marks.uprights(across[lost], 0.0, 0.06)),
-        path("best halo", marks.steps(across[seen], y.scale.place(best[seen]))),
-        path("best", marks.steps(across[seen], y.scale.place(best[seen]))),
+        path("best halo", best_line) if len(across) > MANY else None,
+        path("best", best_line),
     ]
     entries = [("dot ok", "success"), ("dot bad ring", "failure"), ("best", "best success so far")]
     if fresh.any():

@@ -27,9 +27,9 @@ def picture(facts: Facts) -> Markup:
         tag("pre", tag("code", *lines)),
         tag("p", "Versions: ", "; ".join(versions(facts)), "."),
         _configuration(facts),
-        note="The seed decides what is proposed and every trial's noise: with the same versions a run"
-        " on simulators comes out the same to the last digit, however many evaluators take part,"
-        " unless trials were lost or late.",
+        note="The seed decides what is proposed and every trial's noise: with the same versions a"
+        " run on simulators comes out the same to the last digit, however many evaluators take"
+        " part, unless trials were lost or late.",
         wide=True,
     )
 
