@@ -20,6 +20,7 @@ from shearline.learner.run.doorman import Doorman
 from shearline.learner.run.fitter import Fitter
 from shearline.learner.run.folder import Folder, logged_to
 from shearline.learner.run.inbox import Inbox
+from shearline.learner.run.namesake import refuse_namesake
 from shearline.learner.run.outgoing import Outgoing
 from shearline.learner.run.owner import Owner
 from shearline.learner.run.signals import signals_to
@@ -64,7 +65,7 @@ def serve(
 
     Raises:
         ConfigError: If the folder holds a finished or another run, or there is none to resume,
-            or no learner has that name.
+            or no learner has that name, or another learner leads a run of this name.
         RecordError: If the folder or journal cannot be read or written, or is in use.
         LinkError: If the endpoint is taken or malformed.
     """
@@ -76,6 +77,8 @@ def serve(
             _log.warning("%s", folder.damage())
         dispatcher = Dispatcher(config.rules(), lambda: secrets.token_hex(TOKEN_BYTES), folder.book)
         with open_router(listen, settings=settings) as link:
+            if settings and "connect/endpoints" in settings:
+                refuse_namesake(link, keys)
             intake = link.intake(keys.from_evaluators(), keys.wake())
             inbox = Inbox(intake, Doorman(dispatcher.desk))
             owner = _owner(config, folder, keys, dispatcher, link, inbox, on_status)
