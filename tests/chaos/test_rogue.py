@@ -24,8 +24,8 @@ RUN = [
     "--lease", "2", "--no-record",
 ]  # fmt: skip
 
-#: A learner that waited for a peer would wait at least so long [ms]; steps are measured by the
-#: wall, so that on a machine with other work they also contain waiting for a core.
+#: A learner that waited for a peer would wait so long again and again [ms]. By the wall, and so of
+#: all steps but one in a hundred: at a load of 30 a single one waited 1.9 s for a core.
 BLOCKED_MS = 500.0
 
 #: What the learner itself may spend on a step, whatever else the machine does [ms].
@@ -53,5 +53,5 @@ def test_a_rogue_has_no_effect(tmp_path: Path) -> None:
         noise = re.search(r"malformed (\d+), dropped (\d+)", log.read_text())
         assert noise is not None
         assert int(noise[1]) > 100
-        assert last.step_ms_max < BLOCKED_MS
+        assert last.step_ms_p99 < BLOCKED_MS
         assert last.step_cpu_ms_max < STEP_CPU_MS
