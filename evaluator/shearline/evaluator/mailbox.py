@@ -57,7 +57,7 @@ RENEW_LEASES = 0.25
 IDLE_LEASES = 0.5
 
 #: Leases of silence after which a learner is asked whether it still knows us.
-SILENCE_LEASES = 1.5
+SILENCE_LEASES = 3.0
 
 #: How long what runs may finish once the learner ends the run, and how long leaving may take [s].
 FINISH_S = 2.0
@@ -68,7 +68,7 @@ HANG_S = 1.0
 
 #: Attempts held at once, whatever a peer sends; results remembered after they were acknowledged.
 HELD_MAX = 1024
-ANSWERED_MAX = 64
+ANSWERED_MAX = 4
 
 #: Longest wait for an event; only bounds how late a timer can be [s].
 WAIT_S_MAX = 0.5

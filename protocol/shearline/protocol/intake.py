@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -91,7 +91,8 @@ class Intake:
         """Have :meth:`take` return, if only with nothing; not from the thread that takes."""
         if not self._is_woken:
             self._is_woken = True
-            self._waker.put(b"")
+            with suppress(self._closed):
+                self._waker.put(b"")
 
     def take(self) -> object | None:
         """Wait for one item and return it; ``None`` if only woken, or if the session is closed."""

@@ -69,6 +69,14 @@ _COMMON: Mapping[str, object] = {
     "transport/link/rx/max_message_size": 2 * BULK_BYTES_MAX,
 }
 
+#: For a client that only ever sends and hears single small messages: half the memory.
+LIGHT: Mapping[str, object] = {
+    "transport/link/tx/batch_size": 2048,
+    "transport/link/tx/queue/size/data": 2,
+    "transport/link/tx/queue/size/data_low": 2,
+    "transport/link/rx/buffer_size": 2048,
+}
+
 _open_links: WeakSet[Link] = WeakSet()
 
 
@@ -150,17 +158,28 @@ class Link:
         publisher = self._publishers.get((key, None))
         return self._publisher(key, None) if publisher is None else publisher
 
-    def subscribe(self, pattern: str, inbox: Sink) -> None:
+    def subscribe(self, pattern: str, inbox: Sink, *, threaded: bool = True) -> None:
         """Put an :class:`Arrival` into ``inbox`` for everything that others send on a pattern.
 
         In the order of each sender; what comes on another subscription may overtake it.
+
+        Args:
+            pattern: What to hear.
+            inbox: Where it goes.
+            threaded: From a thread of its own. Without one the session's other messages wait
+                meanwhile, but a process can have hundreds of sessions.
         """
+        import zenoh  # noqa: PLC0415 - as above
 
         def enqueue(sample: zenoh.Sample) -> None:
             inbox.put(Arrival(str(sample.key_expr), sample.payload.to_bytes()))
 
         self._declared.append(
-            self._session.declare_subscriber(pattern, enqueue, allowed_origin=self._remote)
+            self._session.declare_subscriber(
+                pattern,
+                zenoh.handlers.Callback(enqueue, indirect=threaded),
+                allowed_origin=self._remote,
+            )
         )
 
     def intake(self, pattern: str, waker: str) -> Intake:

@@ -12,7 +12,8 @@ import shutil
 import struct
 from collections import deque
 from pathlib import Path
-from typing import NamedTuple
+from queue import SimpleQueue
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import given, settings
@@ -32,7 +33,6 @@ from shearline.learner.registry import create
 from shearline.learner.run.config import RunConfig
 from shearline.learner.run.fitter import Fitter, Modelled, Recommended
 from shearline.learner.run.folder import JOURNAL, Folder
-from shearline.learner.run.inbox import Inbox
 from shearline.learner.run.journal import MAGIC
 from shearline.protocol.messages import VERSION, Hello, OutcomeKind, Result, TaskSpec, Trial
 
@@ -80,7 +80,7 @@ class Leading:
         self.folder = folder
         self.evaluator = evaluator
         self.newest_first = newest_first
-        self.inbox = Inbox()
+        self.inbox: SimpleQueue[Any] = SimpleQueue()
         self.numbers = itertools.count()
         self.dispatcher = Dispatcher(config.rules(), self._token, folder.book)
         self.fitter = Fitter(

@@ -22,9 +22,10 @@ from shearline.evaluator.mail import Ended, Event, Heard, LearnerAlive, Quit, Ru
 from shearline.evaluator.mailbox import Mailbox
 from shearline.evaluator.worker import WorkerConfig, run_worker
 from shearline.protocol.codec import BY_TOPIC, decode, encode
+from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys, parse
-from shearline.protocol.link import Link, open_client
+from shearline.protocol.link import LIGHT, Link, open_client, open_router
 from shearline.protocol.messages import VERSION, Hello, Result, Trial, digest
 
 #: How often the timers of light evaluators are looked at [s]; they are set in quarters of seconds.
@@ -46,6 +47,7 @@ class Light:
     link: Link
     mailbox: Mailbox
     keys: Keys
+    due_s: float = 0.0
 
     def handle(self, event: Event) -> bool:
         """Let one event happen, trials and all; tell whether it goes on."""
@@ -62,6 +64,8 @@ class Light:
                         return False
                     case _:
                         pass
+        now_s = time.monotonic()
+        self.due_s = now_s + self.mailbox.wait_s(now_s)
         return True
 
     def _result(self, trial: Trial) -> Result:
@@ -83,6 +87,8 @@ _TASK = WaitTask()
 
 def crowd(endpoint: str, run: str, first: int, count: int) -> None:
     """Be many light evaluators: wait for a line, join, serve until the run ends."""
+    with open_router(free_endpoint()):
+        pass  # a first session brings Zenoh's own threads and tables, whoever it is for
     print("ready", flush=True)
     sys.stdin.readline()
     inbox: SimpleQueue[Any] = SimpleQueue()
@@ -94,16 +100,20 @@ def crowd(endpoint: str, run: str, first: int, count: int) -> None:
     while lights:
         with contextlib.suppress(Empty):
             _pass_on(lights, inbox.get(timeout=LOOK_S))
-        if time.monotonic() >= look_s:
-            look_s = time.monotonic() + LOOK_S
-            lights = {name: light for name, light in lights.items() if light.handle(Tick())}
+        now_s = time.monotonic()
+        if now_s >= look_s:
+            look_s = now_s + LOOK_S
+            due = [light for light in lights.values() if now_s >= light.due_s]
+            for light in due:
+                if not light.handle(Tick()):
+                    del lights[light.name]
 
 
 def _join(endpoint: str, run: str, name: str, inbox: SimpleQueue[Any], *, is_first: bool) -> Light:
     """Connect and say hello."""
-    link, keys = open_client(endpoint), Keys(run)
+    link, keys = open_client(endpoint, settings=LIGHT), Keys(run)
     boot = f"boot-of-{name}"
-    link.subscribe(keys.to_evaluator(name), inbox)
+    link.subscribe(keys.to_evaluator(name), inbox, threaded=False)
     if is_first:  # what is said to all is heard once in this process, and passed on
         link.subscribe(keys.all_cmd(), inbox)
     link.announce(keys.live_evaluator(name, boot))

@@ -22,7 +22,6 @@ from shearline.protocol.messages import (
     Hello,
     Refused,
     Welcome,
-    digest,
 )
 
 
@@ -128,10 +127,11 @@ def _objection(desk: Desk, message: Hello) -> str:
             f"expected protocol version {VERSION}, got {message.version}:"
             " install the same Shearline on both sides"
         )
-    if message.task_digest not in {"", digest(task)}:
+    if message.task_digest not in {"", desk.task_digest}:
         return (
-            f"expected task {task.name!r} with digest {digest(task)}, got {message.task_digest}:"
-            " start learner and evaluator with the same task, bounds and options"
+            f"expected task {task.name!r} with digest {desk.task_digest},"
+            f" got {message.task_digest}: start learner and evaluator with the same task,"
+            " bounds and options"
         )
     if desk.rules.kinds and message.kind not in desk.rules.kinds:
         return (

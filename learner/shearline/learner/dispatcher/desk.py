@@ -31,7 +31,7 @@ from shearline.learner.dispatcher.observed import messages
 from shearline.learner.dispatcher.roster import Evaluator, Roster
 from shearline.learner.dispatcher.rules import REJOIN_LEASES, TURNAROUNDS_MAX, Rules
 from shearline.learner.dispatcher.states import RUN, RunCause, RunState, advance
-from shearline.protocol.messages import EvaluatorState, Message, Trial
+from shearline.protocol.messages import EvaluatorState, Message, Trial, digest
 
 #: Trials of one evaluator that observers are told; most hold two.
 TRIALS_SHOWN = 16
@@ -53,10 +53,14 @@ class Desk:
         rules: What the run is judged by.
         token: Returns a new unguessable token each time.
         book: What the journal of an earlier epoch led to.
+
+    Attributes:
+        is_observed: Whether there are observers to be told anything; it changes nothing else.
     """
 
     def __init__(self, rules: Rules, token: Callable[[], str], book: Book) -> None:
         self.rules = rules
+        self.task_digest = digest(rules.task)
         self.token = token
         self.book = book
         self.roster = Roster(rules.lease_s)
@@ -74,6 +78,7 @@ class Desk:
         self.now_s = 0.0
         self.clock_s = 0.0
         self.out: list[Instruction] = []
+        self.is_observed = True
         self._seen_s: float | None = None
 
     # -- time -------------------------------------------------------------------------------
@@ -90,8 +95,9 @@ class Desk:
         """Change the book, have the change written, and let observers know."""
         self.book.apply(entry)
         self.out.append(Journal(entry))
-        for message in messages(self.book, entry):
-            self.publish(message)
+        if self.is_observed:
+            for message in messages(self.book, entry):
+                self.publish(message)
 
     def send(self, evaluator: str, message: Message) -> None:
         """Send to one evaluator."""
@@ -115,6 +121,8 @@ class Desk:
 
     def show(self, evaluator: Evaluator) -> None:
         """Tell observers where an evaluator stands, if that changed."""
+        if not self.is_observed:
+            return
         state = self.standing(evaluator)
         if state != evaluator.said:
             evaluator.said = state

@@ -80,6 +80,10 @@ class Outgoing:
         """Send to all evaluators."""
         self._send(self._keys.all_cmd(), message, now_s)
 
+    def is_observed(self) -> bool:
+        """Tell whether anyone observes anything of the run at the moment."""
+        return self._link.is_observed(self._keys.observed())
+
     def publish(self, message: Message) -> None:
         """Let observers know, if there are any."""
         evaluator = message.evaluator if isinstance(message, EvaluatorState) else ""

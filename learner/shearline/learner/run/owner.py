@@ -134,6 +134,7 @@ class Owner:
             items = self._left or self._inbox.take()
             began_s, self._left = time.perf_counter(), []
             out: list[Instruction] = []
+            self.dispatcher.desk.is_observed = self._outgoing.is_observed()
             for number, item in enumerate(items, start=1):
                 if isinstance(item, Hurry):
                     return
