@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from shearline.protocol import link as link_module
-from shearline.protocol.codec import BULK_BYTES_MAX
+from shearline.protocol.codec import BULK_BYTES_MAX, CONTROL_BYTES_MAX
 from shearline.protocol.endpoints import check_endpoint, free_endpoint
 from shearline.protocol.errors import LinkError
 from shearline.protocol.intake import Arrival, Presence
@@ -139,6 +139,20 @@ def test_a_message_beyond_the_limit_vanishes_and_the_link_stays(router: Link, cl
     client.publish(key, bytes(2 * BULK_BYTES_MAX + 1000))
     client.publish(key, b"small")
     assert inbox.get(timeout=WAIT_S).payload == b"small"
+
+
+def test_what_is_larger_than_any_control_message_reaches_no_learner(
+    router: Link, client: Link
+) -> None:
+    inbox: SimpleQueue[Any] = SimpleQueue()
+    key = f"{KEYS.root}/ev/lab/result"
+    router.subscribe(key, inbox)
+    _until_heard(client, inbox, key)
+    for size in (CONTROL_BYTES_MAX + 1, CONTROL_BYTES_MAX, BULK_BYTES_MAX):
+        client.publish(key, bytes(size))
+    client.publish(key, b"last")
+    heard = [len(inbox.get(timeout=WAIT_S).payload) for _ in range(2)]
+    assert heard == [CONTROL_BYTES_MAX, len(b"last")]
 
 
 def test_a_learner_is_discovered_once_it_announces_itself(router: Link, client: Link) -> None:

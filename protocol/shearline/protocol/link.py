@@ -18,7 +18,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol, Self
 from weakref import WeakSet
 
-from shearline.protocol.codec import BULK_BYTES_MAX
+from shearline.protocol.codec import BULK_BYTES_MAX, CONTROL_BYTES_MAX
 from shearline.protocol.endpoints import (
     check_endpoint,
     plain,
@@ -27,7 +27,7 @@ from shearline.protocol.endpoints import (
 )
 from shearline.protocol.errors import LinkError
 from shearline.protocol.intake import Arrival, Intake, Presence
-from shearline.protocol.keys import ANY_LEARNER, parse
+from shearline.protocol.keys import ANY_LEARNER, ROOT, parse
 
 if TYPE_CHECKING:
     import zenoh
@@ -68,6 +68,17 @@ _COMMON: Mapping[str, object] = {
     "transport/link/tx/queue/size/data_low": 16,
     "transport/link/rx/max_message_size": 2 * BULK_BYTES_MAX,
 }
+
+#: What is larger than any message to learner or evaluator is dropped before it waits for anyone.
+_SMALL_ONLY = [
+    {
+        "id": "control",
+        "flows": ["ingress"],
+        "messages": ["put", "delete", "query", "reply"],
+        "key_exprs": [f"{ROOT}/*/{whose}/**" for whose in ("ev", "all", "op")],
+        "size_limit": CONTROL_BYTES_MAX,
+    }
+]
 
 #: For a client that only ever sends and hears single small messages: half the memory.
 LIGHT: Mapping[str, object] = {
@@ -270,6 +281,7 @@ def open_router(listen: str, *, settings: Mapping[str, object] | None = None) ->
         "connect/endpoints": [],
         "transport/unicast/max_sessions": SESSIONS_MAX,
         "transport/unicast/accept_pending": SESSIONS_MAX,
+        "low_pass_filter": _SMALL_ONLY,
         **(settings or {}),
     }
     try:
