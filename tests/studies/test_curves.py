@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shearline.studies.curves import curves, table, with_error
+from shearline.studies.curves import curves, markdown, table, with_error
 from shearline.studies.repeat import EVERY, Job, Placement, Repeat
 
 
@@ -59,6 +59,18 @@ def test_the_table_has_a_row_for_each_learner_and_says_what_is_missing() -> None
     assert lines[2].split() == ["psp", "1.50", "±", "0.00", "(1)", "-"]
     assert lines[3].split()[0] == "lhs"
     assert len({len(line) for line in lines[1:]}) == 1
+
+
+def test_the_markdown_says_the_same_and_marks_the_least_of_each_column() -> None:
+    lines = markdown(
+        curves([repeat("psp", 0, [1.5]), repeat("lhs", 0, [1.0]), repeat("lhs", 0, [3.0], 10)])
+    )
+    assert lines == [
+        "| sphere, shifted | 5 | 10 |",
+        "| --- | --- | --- |",
+        "| `psp` | 1.50 ± 0.00 | - |",
+        "| `lhs` | **1.00 ± 0.00** | **3.00 ± 0.00** |",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from itertools import groupby
+from dataclasses import dataclass
 
 import msgspec
 import numpy as np
@@ -58,21 +58,77 @@ def curves(repeats: Iterable[Repeat]) -> list[Curve]:
     return [_curve(cell) for cell in cells.values()]
 
 
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One table: a function and a placement, a row for each learner.
+
+    Attributes:
+        title: Function and placement.
+        dimensions: Of the columns, rising.
+        rows: Learner to its curve in each column, ``None`` where there is none.
+    """
+
+    title: str
+    dimensions: list[int]
+    rows: dict[str, list[Curve | None]]
+
+
+def blocks(found: Iterable[Curve]) -> list[Block]:
+    """Return the tables that curves fill, the learners in the order in which they first come."""
+    cells = {(c.function, c.placement, c.learner, c.dimensions): c for c in found}
+    return [
+        Block(
+            title=f"{function}, {placement}",
+            dimensions=(ns := sorted({k[3] for k in cells if k[:2] == (function, placement)})),
+            rows={
+                learner: [cells.get((function, placement, learner, n)) for n in ns]
+                for learner in dict.fromkeys(k[2] for k in cells if k[:2] == (function, placement))
+            },
+        )
+        for function, placement in dict.fromkeys(key[:2] for key in cells)
+    ]
+
+
 def table(found: Iterable[Curve]) -> list[str]:
-    """Return lines for people: a block for each function and placement, a row for each learner."""
+    """Return lines for people at a terminal: mean, standard error and number of runs."""
     lines: list[str] = []
-    ordered = sorted(found, key=lambda c: (c.function != "sphere", c.placement))
-    for (function, placement), block in groupby(ordered, lambda c: (c.function, c.placement)):
-        rows = list(block)
-        dimensions = sorted({c.dimensions for c in rows})
-        lines += ["", f"{function}, {placement}: mean best cost ± standard error"]
-        lines.append(f"{'':12}" + "".join(f"{f'{n} parameters':>22}" for n in dimensions))
-        cells = {(c.learner, c.dimensions): f"{c.final} ({c.runs})" for c in rows}
-        lines += [
-            f"{learner:12}" + "".join(f"{cells.get((learner, n), '-'):>22}" for n in dimensions)
-            for learner in dict.fromkeys(c.learner for c in rows)
-        ]
+    for block in blocks(found):
+        lines += ["", f"{block.title}: mean best cost ± standard error (runs)"]
+        lines.append(_line("", [f"{n} parameters" for n in block.dimensions]))
+        for learner, row in block.rows.items():
+            cells = [f"{curve.final} ({curve.runs})" if curve else "-" for curve in row]
+            lines.append(_line(learner, cells))
     return lines[1:]
+
+
+def markdown(found: Iterable[Curve]) -> list[str]:
+    """Return the same as Markdown, the least mean of each column in bold."""
+    lines: list[str] = []
+    for block in blocks(found):
+        columns = [f"{n}" for n in block.dimensions]
+        lines += [
+            "",
+            f"| {block.title} | {' | '.join(columns)} |",
+            "| --- " * (1 + len(columns)) + "|",
+        ]
+        least = [
+            min(curve.mean[-1] for curve in column if curve is not None)
+            for column in zip(*block.rows.values(), strict=True)
+        ]
+        for learner, row in block.rows.items():
+            cells = [_bold(curve, low) for curve, low in zip(row, least, strict=True)]
+            lines.append(f"| `{learner}` | {' | '.join(cells)} |")
+    return lines[1:]
+
+
+def _line(head: str, cells: Iterable[str]) -> str:
+    return f"{head:12}" + "".join(f"{cell:>22}" for cell in cells)
+
+
+def _bold(curve: Curve | None, least: float) -> str:
+    if curve is None:
+        return "-"
+    return f"**{curve.final}**" if curve.mean[-1] == least else curve.final
 
 
 def with_error(mean: float, se: float) -> str:

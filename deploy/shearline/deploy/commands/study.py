@@ -78,6 +78,7 @@ def _register_fig4(kinds: Subparsers) -> None:
     fig4.add_argument(
         "--renew", action="store_true", help="run again what was made by other code of a learner"
     )
+    fig4.add_argument("--markdown", action="store_true", help="print the table as Markdown")
     _add_folder(fig4, "fig4")
     add_json(fig4)
     fig4.set_defaults(handler=run_fig4)
@@ -185,7 +186,8 @@ def run_fig4(arguments: argparse.Namespace) -> int:
     )
     found = curves.curves(repeats)
     if not arguments.json:
-        print("\n".join(["", *curves.table(found)]))
+        lines = curves.markdown(found) if arguments.markdown else curves.table(found)
+        print("\n".join(["", *lines]))
     pictures = [] if arguments.no_picture else _draw_fig4(found, arguments.out)
     _finish(arguments, {"curves": _plain(found)}, pictures)
     return Exit.OK
