@@ -1,8 +1,9 @@
 """Every state of a small world, breadth first, so that what breaks is shown by the shortest path.
 
 ``PYTHONPATH=tests python -m simulation.search [WORLD ...]`` says how many states there are. States
-are told apart by a 64-bit hash of all that can decide what follows. With a million states the
-chance that any two share a hash is below one in thirty million.
+are told apart by a 64-bit hash of all that can decide what follows; where the two evaluators are
+alike, a state and its mirror image count as one. With a million states the chance that any two
+share a hash is below one in thirty million.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import NamedTuple
 
 from simulation.plants import NONE, Plant
 from simulation.promises import BrokenError
-from simulation.small_state import Bounds, Frozen, State, key_of
+from simulation.small_state import Bounds, Frozen, State
 from simulation.small_world import SmallWorld
 
 from shearline.learner.dispatcher.states import RunState
@@ -58,7 +59,7 @@ class _Search:
     def run(self) -> Found:
         began_s = time.process_time()
         first = self.world.first()
-        self._enter(first, key_of(*first), "start", -1)
+        self._enter(first, self.world.key_of(first), "start", -1)
         while self.queue:
             number, state = self.queue.popleft()
             try:
@@ -123,6 +124,9 @@ WORLDS: Mapping[str, Bounds] = MappingProxyType(
         "stops": Bounds(kills=0, leases=0, stops=1),
         "robot": Bounds((1, 1), (1, 1), ("simulator", "robot"), kills=0, leases=1),
         "deadlines": Bounds(trials=(1,), credits=(1, 1), trial_s=4.0, kills=0, leases=3),
+        "confirms": Bounds((1,), (1, 1), kills=0, leases=1, confirm=2),
+        "ends": Bounds((2, 1), (1, 1), restarts=0, leases=0),
+        "ends-and-restarts": Bounds((1, 1), (1, 1), leases=0),
     }
 )
 

@@ -5,6 +5,7 @@ Times count from now and no further than they matter, tokens are named by trial 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from shearline.learner.dispatcher import Entry
@@ -35,6 +36,7 @@ class Bounds(NamedTuple):
         kills: Evaluators that end, to be started anew.
         aborts: Deliveries of a result without a verdict.
         stops: Stops by the operator; a stopped run is taken up again by a restart.
+        confirm: Trials behind the last episode that the learner is not told of.
     """
 
     trials: tuple[int, ...] = (2, 1)
@@ -46,6 +48,7 @@ class Bounds(NamedTuple):
     kills: int = 1
     aborts: int = 0
     stops: int = 0
+    confirm: int = 0
 
 
 class Outside(NamedTuple):
@@ -85,28 +88,49 @@ class Frozen(NamedTuple):
     outside: Outside
 
 
-def key_of(desk: Desk, journal: object, outside: Outside) -> int:
+def key_of(state: State, *, mirrored: bool = False) -> int:
     """Return a 64-bit hash of all that can decide what follows, and of nothing else.
 
-    The journal is not part of it: that it leads to the desk's book is asserted elsewhere.
+    In the mirror each evaluator is called what the other one is. The journal is not part of it:
+    that it leads to the desk's book is asserted elsewhere.
     """
-    del journal
-    return hash(_facts(desk, outside))
+    return hash(_facts(state.desk, state.outside, _MIRRORED if mirrored else _PLAIN))
 
 
-def _facts(desk: Desk, outside: Outside) -> tuple[object, ...]:
+def boot_of(name: str, number: int) -> str:
+    """Return the boot of one life of an evaluator."""
+    return f"boot-{name}-{number}"
+
+
+NAMES = ("a", "b")
+
+#: Lives of one evaluator that the tables below have room for.
+LIVES_MAX = 9
+
+#: What evaluators and their boots are called, plainly and in the mirror.
+_PLAIN = {name: name for name in NAMES}
+_MIRRORED = dict(zip(NAMES, NAMES[::-1], strict=True))
+for _names in (_PLAIN, _MIRRORED):
+    _names |= {
+        boot_of(name, number): boot_of(called, number)
+        for name, called in _names.items()
+        for number in range(1, LIVES_MAX + 1)
+    }
+
+
+def _facts(desk: Desk, outside: Outside, called: Mapping[str, str]) -> tuple[object, ...]:
     """Return them, named the same whatever the order of events: tokens by trial and attempt."""
     book, clock_s = desk.book, desk.clock_s
     name = {token: (a.trial, a.number) for token, a in book.attempts.items()}
     attempts = tuple(
         sorted(
-            (name[t], a.evaluator, a.boot, a.copy, a.state, a.overdue)
+            (name[t], called[a.evaluator], called[a.boot], a.copy, a.state, a.overdue)
             for t, a in book.attempts.items()
         )
     )
     trials = tuple(
         (t.state, t.attempts, t.losses, t.aborts, tuple(name[x] for x in t.live),
-         tuple(sorted(t.failed_on)), t.result and name[t.result.token])
+         tuple(sorted(called[e] for e in t.failed_on)), t.result and name[t.result.token])
         for t in book.trials.values()
     )  # fmt: skip
     leases = tuple(
@@ -124,21 +148,23 @@ def _facts(desk: Desk, outside: Outside) -> tuple[object, ...]:
         book.ended is None, book.held, len(book.told), tuple(t.trial for t in book.untold),
         desk.state, desk.asking, desk.crew, leases,
         max(desk.stop_by_s - clock_s, 0.0) if desk.state is RunState.STOPPING else 0.0,
-        tuple(_evaluator(e, clock_s) for e in desk.roster),
+        tuple(_evaluator(e, clock_s, called) for e in desk.roster),
         sent,
-        (outside.boots, *outside[2:]),
+        (outside.boots if called is _PLAIN else outside.boots[::-1], *outside[2:]),
     )  # fmt: skip
 
 
-def _evaluator(evaluator: Evaluator, clock_s: float) -> tuple[object, ...]:
+def _evaluator(
+    evaluator: Evaluator, clock_s: float, called: Mapping[str, str]
+) -> tuple[object, ...]:
     challenger = evaluator.challenger
     return (
-        evaluator.name, evaluator.boot, evaluator.credits, evaluator.strikes,
+        called[evaluator.name], called[evaluator.boot], evaluator.credits, evaluator.strikes,
         evaluator.gone, evaluator.left, evaluator.was_held,
         min(clock_s - evaluator.heard_s, SILENT_S),
         max(evaluator.rests_until_s - clock_s, 0.0),
         challenger and (
-            challenger.boot,
+            called[challenger.boot],
             evaluator.heard_s > challenger.since_s + LEASE_S,
             min(clock_s - challenger.since_s, LEASE_S + 1.0),
         ),

@@ -18,8 +18,18 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from simulation.plants import NONE, Plant
-from simulation.promises import BrokenError, durable
-from simulation.small_state import LEASE_S, STEP_S, Bounds, Frozen, Outside, State, key_of
+from simulation.promises import BrokenError, durable, learn_from_no_confirmation
+from simulation.small_state import (
+    LEASE_S,
+    NAMES,
+    STEP_S,
+    Bounds,
+    Frozen,
+    Outside,
+    State,
+    boot_of,
+    key_of,
+)
 
 from shearline.learner.dispatcher import Book, Dispatcher, Entry, Rules
 from shearline.learner.dispatcher.checks import check, check_desk
@@ -60,8 +70,6 @@ from shearline.protocol.messages import (
 #: Steps after which what was not renewed has lapsed.
 SILENCE_STEPS = 5
 
-NAMES = ("a", "b")
-
 
 class Sign(enum.StrEnum):
     """What is heard of an evaluator while a lease passes."""
@@ -81,11 +89,6 @@ class Move(NamedTuple):
     signs: tuple[Sign, ...] | None = None
 
 
-def boot_of(name: str, number: int) -> str:
-    """Return the boot of one life of an evaluator."""
-    return f"boot-{name}-{number}"
-
-
 class SmallWorld:
     """Tells which states follow a state, and asserts the promises on the way.
 
@@ -99,8 +102,15 @@ class SmallWorld:
         self.plant = plant
         task = TaskSpec(name="small", space={"x": ("", 0.0, 1.0)}, trial_s=bounds.trial_s)
         self.rules = Rules(
-            task, len(bounds.trials), max(bounds.trials), LEASE_S, losses_max=2, aborts_max=2
+            task,
+            len(bounds.trials),
+            max(bounds.trials),
+            LEASE_S,
+            losses_max=2,
+            aborts_max=2,
+            confirm=bounds.confirm,
         )
+        self._are_alike = len(set(zip(bounds.credits, bounds.kinds, strict=True))) == 1
         self._tokens = 0
         self._machine = Dispatcher(self.rules, self._token)
 
@@ -125,20 +135,24 @@ class SmallWorld:
         here = self.thaw(state)
         self._refuse_forgeries(here.desk, state.outside)
         moves = list(self._moves(here.desk, state.outside))
-        own, worn = key_of(*here), self.thaw(state)
+        own, worn = key_of(here), self.thaw(state)
         for move in moves:
-            if not move.events and move.signs is None:
-                after = here._replace(outside=move.outside)
-                yield move.label, key_of(*after), after
-                continue
             out = self._heard(worn.desk, move)
             after = self._asserted(worn, here.desk.book, move, out)
-            key = key_of(*after)
-            yield move.label, key, after
+            yield move.label, self.key_of(after), after
             yield from self._killed(state, move, out, after.outside.restarts)
             # What is as it was may be used again: most moves change nothing.
-            if key != own or _writes(out):
+            if _writes(out) or key_of(after) != own:
                 worn = self.thaw(state)
+
+    def key_of(self, state: State) -> int:
+        """Return what tells a state from all others that matter.
+
+        Of two evaluators that are alike it does not matter which is which: a state and its mirror
+        image have the same key.
+        """
+        key = key_of(state)
+        return min(key, key_of(state, mirrored=True)) if self._are_alike else key
 
     def freeze(self, state: State) -> Frozen:
         """Return a state as a value that nothing changes."""
@@ -194,12 +208,19 @@ class SmallWorld:
                 yield Move(f"abort {token}", less, (ResultReceived(name, aborted),))
 
     def _ends(self, outside: Outside) -> Iterator[Move]:
-        """Yield every end of an evaluator; the next life of it begins at once."""
+        """Yield every end of an evaluator, with the first that is heard of it.
+
+        An end that nobody has heard of can be put off: what follows upon it, silence, may follow
+        upon none as well. The next life of the evaluator begins at once.
+        """
         for index, name in enumerate(NAMES if outside.kills else ()):
             a, b = outside.boots
             boots = (a + 1, b) if index == 0 else (a, b + 1)
             after = outside._replace(boots=boots, kills=outside.kills - 1)
-            yield Move(f"{boot_of(name, outside.boots[index])} ends", after, ())
+            ended = boot_of(name, outside.boots[index])
+            yield Move(f"{ended} ends, gone", after, (EvaluatorGone(name, ended),))
+            yield Move(f"{ended} ends, bye", after, (ByeReceived(name, Bye(boot=ended)),))
+            yield Move(f"{ended} ends, hello", after, (self._hello(name, boots[index]),))
 
     def _leases(self, desk: Desk, outside: Outside) -> Iterator[Move]:
         """Yield every way in which a lease may pass."""
@@ -228,8 +249,9 @@ class SmallWorld:
         return HelloReceived(name, hello)
 
     def _proposals(self, episode: int) -> ProposalsReady:
-        first = sum(self.bounds.trials[:episode])
-        trials = range(first, first + self.bounds.trials[episode])
+        sizes = (*self.bounds.trials, self.bounds.confirm)
+        first = sum(sizes[:episode])
+        trials = range(first, first + sizes[episode])
         return ProposalsReady(episode, [Planned(n, [n / 8], n) for n in trials])
 
     # -- what comes of it -------------------------------------------------------------------
@@ -257,7 +279,7 @@ class SmallWorld:
         less = move.outside._replace(restarts=restarts - 1)
         for cut in _cuts(out):
             after = self._booted(*self._carried(state.journal, less, out[:cut]))
-            yield f"{move.label}, killed after {cut}", key_of(*after), after
+            yield f"{move.label}, killed after {cut}", self.key_of(after), after
 
     def _heard(self, desk: Desk, move: Move) -> list[Instruction]:
         """Return all that the learner does about a move."""
@@ -294,6 +316,7 @@ class SmallWorld:
     ) -> tuple[tuple[Entry, ...], Outside]:
         """Carry instructions out: into the journal, and to the outside."""
         written, sent, asked = list(journal), set(outside.sent), outside.asked
+        learn_from_no_confirmation(out, sum(self.bounds.trials))
         if self.plant.ack_first:
             out = sorted(out, key=lambda instruction: isinstance(instruction, Journal))
         for instruction in out:

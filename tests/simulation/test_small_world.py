@@ -20,6 +20,7 @@ HAUNTS = {
     "late results thrown away": Bounds((1,), (1, 1), restarts=0, leases=3, kills=0),
     "handing out after stop": Bounds((2,), (1, 1), leases=0, kills=0, stops=1),
     "reviving what was given out again": QUICK,
+    "learning from confirmations": Bounds((1,), (1, 1), leases=0, kills=0, confirm=1),
     "copies for anyone": Bounds((1,), (1, 1), ("simulator", "robot"), restarts=0, kills=0),
 }
 
