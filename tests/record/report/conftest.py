@@ -50,7 +50,9 @@ def _summary(**other: Any) -> dict[str, Any]:
 def _machine(episode: int, intercept: float = 0.5) -> Snapshot:
     """A learner's model whose partition is positive near the middle of the space."""
     partition = {"kind": "svm-rbf", "support": [[0.5] * 5], "dual": [1.0], "gamma": 4.0}
+    mixture = {"means": [[0.5] * 5], "covariances": [[[0.01] * 5] * 5]}
     model = {"episode": episode, "partition": partition | {"intercept": intercept - 1.0}}
+    model["mixture"] = mixture
     return Snapshot(episode=episode, learner="psp", model=json.dumps(model), at_s=BEGIN_S)
 
 

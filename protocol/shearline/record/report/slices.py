@@ -1,13 +1,11 @@
 """The learner's partition in two parameters at a time, with the samples: the paper's figure 3.
 
-A slice goes through the recommended tuple: all other parameters are as recommended. Only a
-partition that its learner published as a support vector machine can be cut; where there is none,
-the samples stand alone.
+A slice goes through the recommended tuple: all other parameters are as recommended. Where the
+learner published no partition, the samples stand with what the next trials were drawn from.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations, islice
 from typing import Any
 
@@ -15,10 +13,12 @@ import numpy as np
 
 from shearline.record.report import marks
 from shearline.record.report.contour import positive, zero
+from shearline.record.report.decision import Decision, decision_of
 from shearline.record.report.facts import Facts
 from shearline.record.report.importance import Importance
 from shearline.record.report.markup import Markup, tag
 from shearline.record.report.plot import Axis, card, legend, path, plot
+from shearline.record.report.proposal import ellipses
 from shearline.record.report.scale import Array, Scale
 
 #: Parameters that are cut in pairs, those that matter most.
@@ -29,46 +29,6 @@ MODELS_MAX = 50
 GRID = 49
 
 
-@dataclass(frozen=True, slots=True)
-class Machine:
-    """A decision function ``f(u) = sum_i dual_i exp(-gamma |u - support_i|^2) + intercept``.
-
-    Attributes:
-        support: ``(s, n)`` as shares of the bounds.
-        dual: ``(s,)``.
-        gamma: Kernel width.
-        intercept: Constant term.
-    """
-
-    support: Array
-    dual: Array
-    gamma: float
-    intercept: float
-
-    def decision(self, u: Array) -> Array:
-        """Return ``f`` of tuples ``(m, n)`` as ``(m,)``; at least 0 means good."""
-        squares = (
-            np.sum(u**2, axis=1)[:, None]
-            + np.sum(self.support**2, axis=1)[None, :]
-            - 2.0 * u @ self.support.T
-        )
-        values: Array = np.exp(-self.gamma * np.maximum(squares, 0.0)) @ self.dual
-        return values + self.intercept
-
-
-def machine_of(model: dict[str, Any]) -> Machine | None:
-    """Return the partition of a learner's snapshot, if it has one of a known kind."""
-    said = model.get("partition") or {}
-    if said.get("kind") != "svm-rbf" or not said.get("support"):
-        return None
-    return Machine(
-        np.array(said["support"], dtype=np.float64),
-        np.array(said["dual"], dtype=np.float64),
-        float(said["gamma"]),
-        float(said["intercept"]),
-    )
-
-
 def picture(facts: Facts, found: Importance | None) -> Markup | None:
     """Return slices of the partition; ``None`` where there are no two parameters or no trials."""
     told = facts.success | facts.failure
@@ -76,14 +36,17 @@ def picture(facts: Facts, found: Importance | None) -> Markup | None:
         return None
     order = found.order() if found else list(range(len(facts.names)))
     pairs = list(combinations(sorted(order[:PARAMETERS_MAX]), 2))
-    machine, episode = newest(facts)
+    cut_model, decision = newest(facts)
+    episode = -1 if decision is None else int(cut_model["episode"])
     through = _through(facts)
-    cuts = [None if machine is None else _slice(machine, through, i, j) for i, j in pairs]
+    cuts = [None if decision is None else _slice(decision, through, i, j) for i, j in pairs]
     squares = [
-        tag("div", _square(facts, cut, through, i, j))
+        tag("div", _square(facts, cut_model, cut, through, i, j))
         for cut, (i, j) in zip(cuts, pairs, strict=True)
     ]
     entries = [("dot ok", "success"), ("dot bad ring", "failure"), ("advised dot", "recommended")]
+    if cut_model.get("mixture") or cut_model.get("elite"):
+        entries.append(("drawn", "what trials were drawn from, two deviations"))
     some = any(cut is not None and bool((cut >= 0.0).any()) for cut in cuts)
     if some:
         entries.append(("good", "what the learner takes for good"))
@@ -96,21 +59,19 @@ def picture(facts: Facts, found: Importance | None) -> Markup | None:
     )
 
 
-def newest(facts: Facts) -> tuple[Machine | None, int]:
-    """Return the newest partition that takes any trial for good, and its episode.
+def newest(facts: Facts) -> tuple[dict[str, Any], Decision | None]:
+    """Return the newest model whose partition takes any trial for good, and that partition.
 
-    Where none does it is the newest of all; ``None`` and -1 where there is none.
+    Where none does it is the newest model; its partition may be ``None``.
     """
-    found: tuple[Machine | None, int] = (None, -1)
+    first: tuple[dict[str, Any], Decision | None] = ({}, None)
     for model in islice(facts.models(), MODELS_MAX):
-        machine = machine_of(model)
-        if machine is None:
-            continue
-        if bool((machine.decision(facts.u) >= 0.0).any()):
-            return machine, int(model["episode"])
-        if found[0] is None:
-            found = machine, int(model["episode"])
-    return found
+        decision = decision_of(model, len(facts.names))
+        if decision is not None and bool((decision(facts.u) >= 0.0).any()):
+            return model, decision
+        if not first[0]:
+            first = model, decision
+    return first
 
 
 def _note(facts: Facts, pairs: int, episode: int, *, some: bool) -> str:
@@ -141,7 +102,9 @@ def _through(facts: Facts) -> Array:
     return middle
 
 
-def _square(facts: Facts, values: Array | None, through: Array, i: int, j: int) -> Markup:
+def _square(
+    facts: Facts, model: dict[str, Any], values: Array | None, through: Array, i: int, j: int
+) -> Markup:
     layers: list[Markup | None] = []
     if values is not None:
         layers += [
@@ -151,6 +114,7 @@ def _square(facts: Facts, values: Array | None, through: Array, i: int, j: int) 
             ),
         ]
     layers += _samples(facts, through, i, j)
+    layers += [path("drawn", marks.line(*e.T)) for e in ellipses(model, i, j, len(through))]
     if facts.advice is not None:
         layers += [
             path("advised dot halo", marks.dots(through[i], through[j])),
@@ -160,11 +124,11 @@ def _square(facts: Facts, values: Array | None, through: Array, i: int, j: int) 
     return plot(layers, x, y, f"slice in {x.label} and {y.label}", shape="square")
 
 
-def _slice(machine: Machine, through: Array, i: int, j: int) -> Array:
+def _slice(decision: Decision, through: Array, i: int, j: int) -> Array:
     side = np.linspace(0.0, 1.0, GRID)
     points = np.repeat(through[None, :], GRID * GRID, axis=0)
     points[:, i], points[:, j] = np.repeat(side, GRID), np.tile(side, GRID)
-    return machine.decision(points).reshape(GRID, GRID)
+    return decision(points).reshape(GRID, GRID)
 
 
 def _samples(facts: Facts, through: Array, i: int, j: int) -> list[Markup | None]:
