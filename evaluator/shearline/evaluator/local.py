@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from operator import le
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -25,8 +26,7 @@ EXTRAS_MAX = 64
 EVENTS_MAX = 256
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(msgspec.Struct, frozen=True):
     """How one trial ended, whatever happened in it.
 
     Attributes:
@@ -43,7 +43,7 @@ class Verdict:
     cost: float = 0.0
     why: str = ""
     digest: str = ""
-    extras: Mapping[str, float] = field(default_factory=dict)
+    extras: Mapping[str, float] = {}
     wall_s: float = 0.0
     trace: Trace | None = None
 
@@ -92,10 +92,13 @@ def objection(space: Space, theta: npt.ArrayLike) -> str:
     values = np.asarray(theta, dtype=np.float64)
     if values.shape != (len(space),):
         return f"expected {len(space)} parameters, got shape {values.shape}"
-    for p, value in zip(space, values.tolist(), strict=True):
+    plain = values.tolist()
+    if all(map(le, space.lows, plain)) and all(map(le, plain, space.highs)):
+        return ""
+    for p, value in zip(space, plain, strict=True):
         if not p.low <= value <= p.high:
             return f"{p.name} = {value:g} {p.unit} is outside [{p.low:g}, {p.high:g}]"
-    return ""
+    raise AssertionError(plain)
 
 
 def trace_data(trace: Trace, trial: int, token: str) -> TraceData:
@@ -119,5 +122,7 @@ def _aborted(why: str, start_s: float) -> Verdict:
 
 def _extras(outcome: Outcome) -> dict[str, float]:
     """Keep what a result can carry: a number that is not finite says nothing worth a trial."""
+    if not outcome.extras:
+        return {}
     finite = {clip(k): float(v) for k, v in outcome.extras.items() if math.isfinite(v)}
     return dict(list(finite.items())[:EXTRAS_MAX])

@@ -5,63 +5,55 @@ Events carry no time; the time they are handled at is given beside them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import msgspec
 
 from shearline.protocol.messages import Message, Result, TaskSpec, Trial
 
 # -- events --------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class LearnerAlive:
+class LearnerAlive(msgspec.Struct, frozen=True):
     """One life of the run's learner is there."""
 
     epoch: int
 
 
-@dataclass(frozen=True, slots=True)
-class LearnerGone:
+class LearnerGone(msgspec.Struct, frozen=True):
     """One life of the run's learner ended, or the way to it did."""
 
     epoch: int
 
 
-@dataclass(frozen=True, slots=True)
-class Heard:
+class Heard(msgspec.Struct, frozen=True):
     """The learner said something."""
 
     message: Message
 
 
-@dataclass(frozen=True, slots=True)
-class Ready:
+class Ready(msgspec.Struct, frozen=True):
     """The task is warm: trials may come."""
 
     engine: str
     task_digest: str
 
 
-@dataclass(frozen=True, slots=True)
-class Started:
+class Started(msgspec.Struct, frozen=True):
     """The trial of this token runs."""
 
     token: str
 
 
-@dataclass(frozen=True, slots=True)
-class Beat:
+class Beat(msgspec.Struct, frozen=True):
     """The loop of the running trial is alive."""
 
 
-@dataclass(frozen=True, slots=True)
-class Ended:
+class Ended(msgspec.Struct, frozen=True):
     """An attempt ended like this."""
 
     result: Result
 
 
-@dataclass(frozen=True, slots=True)
-class Leave:
+class Leave(msgspec.Struct, frozen=True):
     """This process is to end, with this exit code; ``finish`` lets what runs come to its end."""
 
     code: int
@@ -69,8 +61,7 @@ class Leave:
     finish: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Tick:
+class Tick(msgspec.Struct, frozen=True):
     """Nothing happened for a while."""
 
 
@@ -80,43 +71,37 @@ Event = LearnerAlive | LearnerGone | Heard | Ready | Started | Beat | Ended | Le
 # -- instructions --------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Send:
+class Send(msgspec.Struct, frozen=True):
     """Say this to the learner."""
 
     message: Message
 
 
-@dataclass(frozen=True, slots=True)
-class Prepare:
+class Prepare(msgspec.Struct, frozen=True):
     """Load and warm the task that the learner named."""
 
     task: TaskSpec
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+class Run(msgspec.Struct, frozen=True):
     """Run this trial when those before it have ended."""
 
     trial: Trial
 
 
-@dataclass(frozen=True, slots=True)
-class Gate:
+class Gate(msgspec.Struct, frozen=True):
     """Whether a trial may begin."""
 
     is_open: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Abort:
+class Abort(msgspec.Struct, frozen=True):
     """End the running trial at its next beat, and begin no other."""
 
     why: str
 
 
-@dataclass(frozen=True, slots=True)
-class Quit:
+class Quit(msgspec.Struct, frozen=True):
     """It is over."""
 
     code: int

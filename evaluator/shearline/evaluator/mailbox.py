@@ -149,21 +149,21 @@ class Mailbox:
         if self.over:
             return []
         self._out = []
-        match event:
+        match event:  # what comes with every trial first
+            case Heard(message):
+                self._heard(message, now_s)
+            case Started(token):
+                self._started(token, now_s)
+            case Ended(result):
+                self._ended(result, now_s)
+            case Beat() if self.running is not None:
+                self._renew(now_s)
             case LearnerAlive(epoch):
                 self._alive(epoch, now_s)
             case LearnerGone(epoch):
                 self._gone(epoch, now_s)
-            case Heard(message):
-                self._heard(message, now_s)
             case Ready(engine, task_digest):
                 self._ready(engine, task_digest, now_s)
-            case Started(token):
-                self._started(token, now_s)
-            case Beat() if self.running is not None:
-                self._renew(now_s)
-            case Ended(result):
-                self._ended(result, now_s)
             case Leave(code, why, finish):
                 self._leave(code, why, now_s, finish=finish)
             case _:
@@ -214,14 +214,14 @@ class Mailbox:
             self._hello_s = now_s + SILENCE_LEASES * self.lease_s
             self._hello_delay_s = RESEND_S_MIN
         match message:
-            case Welcome():
-                self._welcome(message, now_s)
-            case Refused(why=why, ended=ended):
-                self._leave(0 if ended else 4, why, now_s, finish=False)
             case Trial(counted=counted):
                 for token in counted:
                     self._acked(token)
                 self._given(message, now_s)
+            case Welcome():
+                self._welcome(message, now_s)
+            case Refused(why=why, ended=ended):
+                self._leave(0 if ended else 4, why, now_s, finish=False)
             case Ack(token=token):
                 self._acked(token)
             case Command(kind=CommandKind.STOP, why=why):
