@@ -10,7 +10,6 @@ import pytest
 
 from shearline.learner import Learner, Space, create
 from shearline.learner.base import Array
-from shearline.learner.cmaes import generations
 from shearline.learner.threads import fitting
 from shearline.sims.functions import shifted, sphere
 from shearline.studies.benchmark import benchmark
@@ -23,13 +22,15 @@ def bowl(u: Array) -> float:
     return float(np.sum((u - 0.7) ** 2))
 
 
-def alone(n: int, seed: int, cost: Cost, batches: int, **options: object) -> list[Array]:
-    """Run the package by itself and return its generations ``(batch, n)``."""
+def alone(
+    n: int, seed: int, cost: Cost, batches: int, size: int = BATCH, **options: object
+) -> list[Array]:
+    """Run the package by itself and return its generations ``(size, n)``."""
     rngs = iter([np.random.default_rng([seed, k]) for k in range(batches)])
     rng = next(rngs)
     strategy = cma.CMAEvolutionStrategy(
         n * [0.5],
-        0.3,
+        0.2,
         {
             "bounds": [0.0, 1.0],
             "randn": lambda *shape: rng.standard_normal(shape),
@@ -43,7 +44,7 @@ def alone(n: int, seed: int, cost: Cost, batches: int, **options: object) -> lis
         for k in range(batches):
             if k:
                 rng = next(rngs)
-            solutions = strategy.ask()
+            solutions = strategy.ask(size)
             strategy.tell(solutions, [cost(x) for x in solutions])
             asked.append(np.array(solutions))
     return asked
@@ -63,6 +64,30 @@ def test_with_one_generation_an_episode_it_is_the_package_bit_for_bit(n: int) ->
         np.testing.assert_array_equal(batch(learner, bowl), expected)
 
 
+@pytest.mark.filterwarnings("ignore:.*number of solutions passed to `tell`")
+@pytest.mark.parametrize("size", [12, 40])
+def test_in_batches_it_is_the_package_asked_for_as_many_bit_for_bit(size: int) -> None:
+    """In 20 dimensions 12 is the package's own population, so that this is its plain use."""
+    problem = shifted(sphere, 20, 1)
+
+    def cost(u: Array) -> float:
+        return float(problem.cost(problem.space.denormalise(u)))
+
+    learner = create("cmaes", Space.unit(20), size, seed=3)
+    found = np.concatenate([batch(learner, cost) for _ in range(10)])
+    np.testing.assert_array_equal(found, np.concatenate(alone(20, 3, cost, 10, size)))
+
+
+@pytest.mark.parametrize("population", ["package", "episode"])
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_it_goes_on_converging(n: int, population: str) -> None:
+    """Told in several generations an episode, it would come to rest elsewhere."""
+    learner = create("cmaes", Space.unit(n), 40, seed=0, population=population)
+    for _ in range(40):
+        tried = batch(learner, bowl)
+    assert np.mean([bowl(u) for u in tried]) < 1e-4
+
+
 def test_with_the_penalty_handler_too() -> None:
     learner = create("cmaes", Space.unit(3), BATCH, 3, population="episode", boundary="penalty")
     for expected in alone(3, 3, bowl, 6, popsize=BATCH, BoundaryHandler=cma.BoundPenalty):
@@ -75,16 +100,6 @@ def test_it_starts_where_it_is_told_to(start: float, spread: float) -> None:
     first = np.array([p.theta for p in learner.ask(200)])
     assert first.mean(axis=0) == pytest.approx(10.0 * start - 5.0, abs=2.5 * spread)
     assert first.std(axis=0) == pytest.approx(10.0 * spread, rel=0.2)
-
-
-@pytest.mark.parametrize("count", range(1, 60))
-def test_generations_share_out_all_outcomes_in_whole_populations(count: int) -> None:
-    found = generations(count, 12)
-    assert [k for first, beyond in found for k in range(first, beyond)] == list(range(count))
-    sizes = [beyond - first for first, beyond in found]
-    assert all(size == 12 for size in sizes[:-1])
-    assert sizes[-1] < 24
-    assert sizes[-1] >= min(12, count)
 
 
 def test_an_episode_with_some_missing_still_teaches() -> None:
@@ -148,20 +163,7 @@ def test_a_snapshot_has_the_distribution() -> None:
     assert first.std(axis=0) == pytest.approx(0.05, rel=0.15)
 
 
-def best_alone(seed: int, trials: int) -> float:
-    """Return the best cost that the package finds by itself, generation by generation."""
-    problem = shifted(sphere, 20, seed)
-
-    def cost(u: Array) -> float:
-        return float(problem.cost(problem.space.denormalise(u)))
-
-    tried = np.concatenate(alone(20, seed, cost, -(-trials // 12)))[:trials]
-    return min(cost(u) for u in tried)
-
-
 @pytest.mark.slow
-def test_in_batches_of_forty_it_is_no_worse_than_the_package_alone() -> None:
-    """The package by itself learns after every 12 trials, here it has to wait for 40."""
-    seeds = range(40)
-    [row] = benchmark(["cmaes"], lambda seed: shifted(sphere, 20, seed), seeds=seeds)
-    assert row.best <= 1.1 * np.mean([best_alone(seed, 400) for seed in seeds])
+def test_the_shifted_sphere_is_reached_as_far_as_documented() -> None:
+    [row] = benchmark(["cmaes"], lambda seed: shifted(sphere, 20, seed))
+    assert row.best <= 20.0

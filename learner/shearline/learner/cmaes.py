@@ -1,7 +1,7 @@
 """CMA-ES, the covariance matrix adaptation evolution strategy, through the ``cma`` package.
 
 Hansen, Akimoto and Baudis's package (BSD licence) does the search; this translates: trials that
-come back late, in pieces or never into generations, failures into costs. It knows nothing of how
+come back late or never into generations, failures into costs. It knows nothing of how
 the package adapts.
 """
 
@@ -34,10 +34,10 @@ SCALE_MIN = 0.001
 
 
 class Population(enum.StrEnum):
-    """How many solutions make a generation."""
+    """For how many solutions the package sets its rates and weights."""
 
-    PACKAGE = "package"  # 4 + 3 log n; an episode holds several, drawn from one distribution
-    EPISODE = "episode"  # one generation is one episode
+    PACKAGE = "package"  # 4 + 3 log n, however many an episode has: it selects its best as sharply
+    EPISODE = "episode"  # as many as an episode has
 
 
 class Boundary(enum.StrEnum):
@@ -52,11 +52,12 @@ class CMAESConfig:
     """What the package leaves to its user, and what our episodes add.
 
     Attributes:
-        population: Size of a generation.
-        start: Where every parameter starts, as a share of its range: .5 is the middle of the box;
-            the paper's authors' code (MIOS) starts at .1.
-        spread: Standard deviation at the start as a share of the range; the package advises that
-            the optimum lie within three of them. MIOS takes .2.
+        population: Size of a generation that the package is set for. An episode is one
+            generation in either case.
+        start: Where every parameter starts, as a share of its range: .5 is the middle of the box,
+            .1 near its low end, as in experiments of the paper's authors.
+        spread: Standard deviation at the start as a share of the range; the authors' public
+            code (MIOS) takes .2, and the package advises that the optimum lie within three of them.
         boundary: The boundary handler.
         failures: Whether failures differ among themselves. Costs only count by their rank within
             a generation.
@@ -64,7 +65,7 @@ class CMAESConfig:
 
     population: Population = Population.PACKAGE
     start: float = 0.5
-    spread: float = 0.3
+    spread: float = 0.2
     boundary: Boundary = Boundary.TRANSFORM
     failures: Failures = Failures.ALIKE
 
@@ -76,11 +77,13 @@ class CMAESConfig:
 class CMAES(EpisodicLearner):
     """The package's ask and tell behind ours.
 
-    Outcomes wait in line, by trial number, until an episode begins; then all that wait are told,
-    each once, generation by generation. Fewer than a population are one generation; fewer than
-    the package can do with wait on. So a missing trial costs its own
-    information and nothing else. A late one belongs to a distribution that has moved on: the
-    package shortens its step to a plausible length, as it does with any foreign solution.
+    Outcomes wait in line, by trial number, until an episode begins. Then all that wait are told as
+    one generation, each once; fewer than the package can select from wait on. So a missing trial
+    costs its own information and nothing else. A late one belongs to a distribution that has moved
+    on: the package shortens its step to a plausible length, as it does with any foreign solution.
+
+    An episode is never told as several generations: the package takes each for a sample around a
+    mean that has moved since, and its steps shrink to nothing (5-D sphere: stuck at .03).
 
     Args:
         space: What is being learned.
@@ -109,7 +112,8 @@ class CMAES(EpisodicLearner):
     def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
         self._normal = rng
         with fitting(), warnings.catch_warnings():
-            # It warns of generations larger than usual, which a batch makes; the sizes are ours.
+            # It warns of generations larger than it was set for, which it handles: the weights
+            # then go to the best and the worst.
             warnings.simplefilter("ignore")
             if self._strategy is None:
                 self._strategy = self._make()
@@ -149,21 +153,17 @@ class CMAES(EpisodicLearner):
         return cma.CMAEvolutionStrategy(n * [self.config.start], self.config.spread, options)
 
     def _tell_waiting(self, episode: int, trials: Trials) -> None:
-        """Tell the package in generations what it has not been told."""
-        cost = charged(trials, self.config.failures)
-        waiting = [i for i, k in enumerate(trials.number.tolist()) if k not in self._told]
+        """Tell the package, as one generation, what it has not been told."""
+        told = [k in self._told for k in trials.number.tolist()]
+        waiting = np.flatnonzero(~np.array(told, dtype=np.bool_))
         if len(waiting) < max(POPULATION_MIN, int(self._strategy.sp.weights.mu)):
             return
-        for first, beyond in generations(len(waiting), int(self._strategy.popsize)):
-            if first:
-                # The package takes one generation per ask; what this draws is dropped.
-                self._strategy.ask(1)
-            chosen = waiting[first:beyond]
-            numbers = trials.number[chosen].tolist()
-            solutions = [self._solutions[k] for k in numbers]
-            late = [i for i, k in enumerate(numbers) if k // self.episode_length < episode - 1]
-            self._strategy.tell(solutions, cost[chosen].tolist(), check_points=late)
-            self._told.update(numbers)
+        numbers = trials.number[waiting].tolist()
+        solutions = [self._solutions[k] for k in numbers]
+        cost = charged(trials, self.config.failures)[waiting]
+        late = [i for i, k in enumerate(numbers) if k // self.episode_length < episode - 1]
+        self._strategy.tell(solutions, cost.tolist(), check_points=late)
+        self._told.update(numbers)
 
     def _focus(self, trials: Trials) -> Focus:
         """Return the distribution's mean and spread, once it has been told of a success."""
@@ -177,16 +177,6 @@ class CMAES(EpisodicLearner):
     def _model(self) -> Mapping[str, object]:
         mixture = None if self._strategy is None else gaussian(self._strategy, len(self.space))
         return {"config": plain(self.config), "mixture": mixture}
-
-
-def generations(count: int, population: int) -> list[tuple[int, int]]:
-    """Return where generations begin and end in a line of ``count`` outcomes.
-
-    Each has the population's size; the last takes in what is left over. (Even sizes did worse, a
-    larger first one worse still: 13.4 and 14.4 against 11.3 on the shifted 20-D sphere.)
-    """
-    starts = [k * population for k in range(max(1, count // population))]
-    return list(zip(starts, [*starts[1:], count], strict=True))
 
 
 def gaussian(strategy: Any, n: int) -> dict[str, object]:

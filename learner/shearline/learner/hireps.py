@@ -50,7 +50,8 @@ class HiREPSConfig:
     Attributes:
         options: n, Gaussians of the policy.
         information_loss: epsilon, most relative entropy [nat] between the new policy and the
-            samples; 1 is usual for REPS, .5 is slower, 2 collapses.
+            samples; 1 is usual for REPS. Half of it is slower; twice as much is faster as long
+            as ``memory`` keeps the options from collapsing.
         entropy: kappa, share of the present entropy of the options' responsibilities that the
             new policy may keep, 0 to 1; below 1 pushes options apart.
         history: H, earlier episodes that are weighted in.

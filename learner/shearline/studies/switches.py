@@ -66,9 +66,8 @@ RIVALS: Variants = MappingProxyType(
         "pso, walls=reflect": ("pso", {"walls": "reflect"}),
         "cmaes": ("cmaes", {}),
         "cmaes, population=episode": ("cmaes", {"population": "episode"}),
-        "cmaes, spread=.2": ("cmaes", {"spread": 0.2}),
+        "cmaes, spread=.3": ("cmaes", {"spread": 0.3}),
         "cmaes, start=.1": ("cmaes", {"start": 0.1}),
-        "cmaes, start=.1, spread=.2": ("cmaes", {"start": 0.1, "spread": 0.2}),
         "cmaes, boundary=penalty": ("cmaes", {"boundary": "penalty"}),
     }
 )
