@@ -55,7 +55,8 @@ def print_summary(summary: Mapping[str, Any], run_dir: Path, units: Mapping[str,
         console.print(_tuple(summary["recommendation"], units))
     for text in confirmations(summary):
         console.print(f"\n{text}")
-    console.print(f"\nlook at it in Rerun  {_ourselves()} view {run_dir}", soft_wrap=True)
+    console.print(f"\nread about it        {_ourselves()} report {run_dir}", soft_wrap=True)
+    console.print(f"look at it in Rerun  {_ourselves()} view {run_dir}", soft_wrap=True)
     console.print(f"run a trial again    {_ourselves()} replay {run_dir} --trial 0", soft_wrap=True)
     console.print(f"list its trials      {_ourselves()} trials {run_dir} --json", soft_wrap=True)
 

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shearline.learner.region import Region
 from shearline.protocol.errors import RecordError
+from shearline.protocol.space import Space
 from shearline.record.report.facts import Facts, gather
 
 
@@ -32,10 +34,19 @@ def test_the_advice_has_its_interval_its_region_and_its_claim(facts: Facts) -> N
     assert advice is not None
     assert advice.theta.tolist() == [12.0, 0.05, 5.0, 1.5, 100.0]
     assert (advice.probability, advice.interval, advice.cost) == (0.93, (0.85, 1.0), 0.41)
-    assert advice.radius is not None
-    assert advice.radius.tolist() == [3.0, 0.01, 1.0, 0.5, 300.0]
+    assert advice.spread is not None
+    half_axes = np.array([3.0, 0.01, 1.0, 0.5, 300.0])
+    np.testing.assert_allclose(advice.spread, half_axes / np.sqrt(5 + 2))
     assert "at least 81 %" in advice.claim
     assert "37 of 40 trials" in advice.claim
+
+
+def test_the_spread_is_that_of_draws_from_the_region() -> None:
+    n, radius = 23, 0.05
+    space = Space.box(n, -1.0, 1.0)
+    region = Region(space, np.zeros(n), np.full(n, radius), 0.9, 0.95, 40, 40)
+    drawn = region.sample(np.random.default_rng(0), 20_000).std(axis=0)
+    np.testing.assert_allclose(drawn, radius / np.sqrt(n + 2), rtol=0.05)
 
 
 def test_a_confirmation_is_told_apart_by_what_was_tried(facts: Facts) -> None:

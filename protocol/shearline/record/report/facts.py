@@ -6,6 +6,7 @@ Reads the record and the run's ``summary.json``; draws nothing.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -32,7 +33,9 @@ class Advice:
         probability: Estimated chance that a fresh trial of it succeeds, 0 to 1.
         interval: ``(low, high)`` of that chance with 95 % confidence.
         cost: Expected of a success, or ``None``.
-        radius: Half axes ``(n,)`` in task units of the region around the tuple, or ``None``.
+        spread: Standard deviation ``(n,)`` in task units of draws from the region around the
+            tuple, where bounds do not cut it: of a uniform draw from an ellipsoid in n dimensions
+            the half axis over ``sqrt(n + 2)``. ``None`` without a region.
         claim: One sentence on what a draw from the region is worth, or ``""``.
     """
 
@@ -40,7 +43,7 @@ class Advice:
     probability: float
     interval: tuple[float, float]
     cost: float | None
-    radius: Array | None = None
+    spread: Array | None = None
     claim: str = ""
 
 
@@ -248,13 +251,16 @@ def gather(run_dir: Path | str) -> Facts:
 def _advice(said: dict[str, Any], names: list[str]) -> Advice:
     low, high = said["interval"]
     region = said.get("region") or {}
-    radius = region.get("radius") or {}
+    radius = region.get("radius")
+    spread = None
+    if radius:
+        spread = np.array([radius.get(name, 0.0) for name in names]) / math.sqrt(len(names) + 2)
     return Advice(
         theta=np.array([said["theta"].get(name, np.nan) for name in names]),
         probability=float(said["success_probability"]),
         interval=(float(low), float(high)),
         cost=said["cost"],
-        radius=np.array([radius.get(name, 0.0) for name in names]) if radius else None,
+        spread=spread,
         claim=_claim(region) if region else "",
     )
 

@@ -63,18 +63,19 @@ def _confirmation(facts: Facts, tried: Confirmation) -> Markup:
 
 
 def _note(advice: Advice) -> str:
-    if advice.radius is None:
+    if advice.spread is None:
         return "No region around this tuple is on record."
     return (
-        "The band is the region around the tuple: half axes of an ellipsoid. " + advice.claim
+        "The band is one standard deviation either way of a draw from the region around the tuple. "
+        + advice.claim
     ).strip()
 
 
 def _table(facts: Facts, advice: Advice) -> Markup:
     low, high = facts.bounds
     u = facts.unit_of(advice.theta)
-    reach = np.zeros(len(u)) if advice.radius is None else advice.radius / (high - low)
-    head = ["parameter", "value", "in its range", *([] if advice.radius is None else ["region"])]
+    reach = np.zeros(len(u)) if advice.spread is None else advice.spread / (high - low)
+    head = ["parameter", "value", "in its range", *([] if advice.spread is None else ["region"])]
     rows = [_row(facts, advice, u[i], float(reach[i]), i) for i in range(len(u))]
     return tag(
         "table",
@@ -88,7 +89,7 @@ def _row(facts: Facts, advice: Advice, u: float, reach: float, i: int) -> Markup
     low, high = (float(bound[i]) for bound in facts.bounds)
     unit = facts.units[i]
     value = float(advice.theta[i])
-    radius = None if advice.radius is None else f"± {number(float(advice.radius[i]), 2)}"
+    spread = None if advice.spread is None else f"± {number(float(advice.spread[i]), 2)}"
     return tag(
         "tr",
         tag("th", facts.names[i], scope="row"),
@@ -99,7 +100,7 @@ def _row(facts: Facts, advice: Advice, u: float, reach: float, i: int) -> Markup
             class_="range",
             title=f"{number(low)} to {quantity(high, unit)}",
         ),
-        tag("td", radius, class_="n faint") if radius else None,
+        tag("td", spread, class_="n faint") if spread else None,
     )
 
 
