@@ -7,9 +7,10 @@ import itertools
 import pytest
 from simulation.lab import LEASE_S, TASK, Lab, published, said, sent, verdicts
 
+from shearline.learner.dispatcher import core
 from shearline.learner.dispatcher.entries import AttemptLapsed, LapseReason, ResultTaken
 from shearline.learner.dispatcher.events import Tick
-from shearline.learner.dispatcher.instructions import Ask, Journal, Send, Told
+from shearline.learner.dispatcher.instructions import Ask, Instruction, Journal, Send, Told
 from shearline.learner.dispatcher.rules import ATTEMPTS_MAX, REST_S_MAX
 from shearline.learner.dispatcher.states import TrialState
 from shearline.protocol.messages import Ack, Counted, OutcomeKind, Verdict
@@ -63,6 +64,26 @@ def test_an_attempt_not_renewed_for_a_lease_is_given_out_again() -> None:
     assert lab.dispatcher.book.trials[0].state is TrialState.PENDING
     lab.result("b", lab.given("b")[0].token)
     assert lab.holds("b") == [0]
+
+
+def test_when_a_crowd_falls_silent_a_tick_gives_up_so_many_attempts_and_the_next_one_the_rest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(core, "LAPSES_MAX", 3)
+    lab = Lab(trials=8)
+    lab.propose()
+    for name in "abcd":
+        lab.hello(name)
+    held, lapsed = len(lab.dispatcher.book.live), []
+    for _ in range(16):
+        out = lab.wait(LEASE_S / 8)
+        lapsed += [len([i for i in out if _lapses(i)])]
+    assert held > 6
+    assert [n for n in lapsed if n] == [3, 3, held - 6]
+
+
+def _lapses(instruction: Instruction) -> bool:
+    return isinstance(instruction, Journal) and isinstance(instruction.entry, AttemptLapsed)
 
 
 def test_a_renewed_attempt_keeps_its_lease() -> None:
