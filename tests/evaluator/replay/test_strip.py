@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from shearline.evaluator.keylock import KeylockTask
 from shearline.evaluator.replay import Case, Change, Replayed, again
@@ -17,7 +18,7 @@ WIDTH = 1280
 @pytest.fixture(scope="module")
 def replayed(keylock: KeylockTask, recorded: Case) -> Replayed:
     again_ = again(keylock, recorded)
-    return replace(again_, verdict=replace(again_.verdict, trace=recorded.traces[0]))
+    return replace(again_, verdict=structs.replace(again_.verdict, trace=recorded.traces[0]))
 
 
 def test_a_caption_says_which_trial_how_it_ended_and_how_fast_it_goes(replayed: Replayed) -> None:
