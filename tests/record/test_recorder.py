@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
+from msgspec.structs import replace
 
 from shearline.protocol.codec import encode
 from shearline.protocol.endpoints import free_endpoint
@@ -187,6 +188,34 @@ def test_a_killed_recorder_loses_at_most_what_the_last_second_brought(
     assert {outcome.trial for outcome in run.outcomes} >= half
     assert seal_all(run_dir) == 1
     assert open_run(run_dir).damage == []
+
+
+@pytest.mark.chaos
+@pytest.mark.slow
+def test_a_killed_recorder_loses_at_most_a_second_of_traces(
+    run_dir: Path, messages: Messages
+) -> None:
+    """Traces are said for three seconds, then the recorder is killed in mid-stream."""
+    one = next(message for message in messages(hz=1000) if isinstance(message, TraceData))
+    said_s: dict[int, float] = {}
+    with learner() as link, child(link, run_dir) as process:
+        start_s = time.monotonic()
+        pause = threading.Event()
+        while time.monotonic() < start_s + 3.0:
+            number = len(said_s)
+            say(link, [replace(one, trial=number)])
+            said_s[number] = time.monotonic()
+            pause.wait(0.02)  # the pace of a hall of simulators
+        process.kill()
+        killed_s = time.monotonic()
+        process.wait()
+    seal_all(run_dir)
+    run = open_run(run_dir)
+    kept = set(run.traced())
+    lost_s = max((killed_s - at_s for n, at_s in said_s.items() if n not in kept), default=0.0)
+    assert len(kept) > 0.5 * len(said_s)
+    assert lost_s <= 1.0
+    assert run.damage == []
 
 
 @pytest.mark.chaos

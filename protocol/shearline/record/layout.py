@@ -127,7 +127,7 @@ def _page(root: str, title: str, shape: Shape) -> rrb.Container:
     # side by side, a card beside its scene would leave neither room
     many = len(shape.trials) > 1
     top = rrb.Tabs(*head, active_tab=min(1, len(head) - 1)) if many else rrb.Horizontal(*head)
-    return rrb.Vertical(top, phases, *plots, row_shares=[5, 1, *[2] * len(plots)])
+    return rrb.Vertical(top, phases, *plots, row_shares=[7, 2, *[2] * len(plots)])
 
 
 def _tip(root: str, name: str, shape: Shape) -> rrb.Spatial3DView:
@@ -147,7 +147,7 @@ def _tip(root: str, name: str, shape: Shape) -> rrb.Spatial3DView:
 
 def _arm(root: str) -> rrb.Spatial3DView:
     eye = rrb.EyeControls3D(
-        kind="Orbital", position=(1.5, -1.3, 0.9), look_target=(0.25, 0.0, 0.35), eye_up=(0, 0, 1)
+        kind="Orbital", position=(1.15, -0.95, 0.75), look_target=(0.27, 0.0, 0.36), eye_up=(0, 0, 1)
     )
     return rrb.Spatial3DView(origin=f"/{root}", name="scene", eye_controls=eye, line_grid=False)
 
@@ -174,7 +174,7 @@ def _eye(tip: npt.NDArray[np.float32], *, down_z: bool) -> rrb.EyeControls3D:
     size = max(float(np.linalg.norm(high - low)), 0.01)
     return rrb.EyeControls3D(
         kind="Orbital",
-        position=(centre + size * np.array([0.9, -0.9, 0.5 * up])).tolist(),
+        position=(centre + size * np.array([1.15, -0.5, 0.45 * up])).tolist(),
         look_target=centre.tolist(),
         eye_up=[0.0, 0.0, up],
     )
