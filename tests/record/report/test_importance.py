@@ -38,6 +38,19 @@ def test_what_drifts_with_the_learners_progress_does_not_seem_to_matter() -> Non
     assert found.explained.max() < 0.12
 
 
+def test_episodes_that_hardly_vary_anything_do_not_drown_those_that_do() -> None:
+    rng = np.random.default_rng(6)
+    spread = 0.8 ** EPISODES[:, None]
+    u = 0.5 + 0.3 * spread * rng.standard_normal((200, 8))
+    cost = 100.0 * (u[:, 3] - 0.2) + 1.0 * rng.standard_normal(200)
+    narrow = spread[:, 0] < 0.2
+    cost[narrow] = rng.random(int(narrow.sum()))
+    found = importance(u, ranked(cost, np.ones(200, dtype=bool)), EPISODES)
+    assert found is not None
+    assert found.order()[0] == 3
+    assert found.explained[3] > 0.6
+
+
 def test_chance_is_beaten_about_once_in_twenty() -> None:
     rng = np.random.default_rng(3)
     u, ranks = rng.random((200, 200)), rng.permutation(200).astype(float)

@@ -1,10 +1,11 @@
 """Which parameters matter: how much of the outcome each one explains on its own, and the picture.
 
-Trials are ranked from the cheapest success to the dearest failure. A parameter's importance is the
-share of the ranks' variance within episodes that a parabola in it explains (the within, or fixed
-effects, estimator of panel data): a learner moves all parameters and the outcome together from
-episode to episode, which would make every parameter seem to matter. What ranks shuffled within
-their episodes reach by chance is said beside it. Nothing here knows what a parameter does.
+Trials are ranked within their episode, from the cheapest success to the dearest failure. A
+parameter's importance is the share of the ranks' variance that a parabola in it explains (the
+within, or fixed effects, estimator of panel data): a learner moves all parameters and the outcome
+together from episode to episode, which would make every parameter seem to matter. Episodes weigh
+as much as they vary the parameters: late ones say little. What ranks shuffled within their episodes
+reach by chance is said beside it. Nothing here knows what a parameter does.
 """
 
 from __future__ import annotations
@@ -54,13 +55,14 @@ def importance(u: Array, ranks: Array, episode: npt.NDArray[np.int64]) -> Import
         ranks: One for each trial ``(trials,)``.
         episode: Of each trial ``(trials,)``; trials are only compared within theirs.
     """
-    within = _centred(ranks[None, :], episode)
-    if len(ranks) < TRIALS_MIN or float(np.abs(within).max()) < TINY:
+    places = _places(ranks, episode)
+    weight = _weights(u, episode)
+    if len(ranks) < TRIALS_MIN or float(np.abs(weight * places).max()) < TINY:
         return None
     rng = np.random.default_rng(0)
-    shuffled = [_shuffled(within[0], episode, rng) for _ in range(SHUFFLES)]
-    rows = np.stack([within[0], *shuffled])
-    shares = np.stack([_explained(rows, column, episode) for column in u.T], axis=1)
+    shuffled = [_shuffled(places, episode, rng) for _ in range(SHUFFLES)]
+    rows = weight * np.stack([places, *shuffled])
+    shares = np.stack([_explained(rows, column, weight, episode) for column in u.T], axis=1)
     return Importance(shares[0], np.quantile(shares[1:], 0.95, axis=0))
 
 
@@ -96,9 +98,10 @@ def picture(facts: Facts, found: Importance | None) -> Markup:
     reach = max(float(found.explained.max()), float(found.chance.max()), 1e-9)
     rows = [_row(facts.names[i], found.explained[i], found.chance[i], reach) for i in found.order()]
     note = (
-        "Share of the outcome (trials ranked by cost, failures last) that each parameter explains"
-        " on its own among the trials of an episode; up to the line, chance alone would do. A"
-        " parameter that the learner hardly varies cannot show what it does."
+        "Share of the outcome (trials ranked within their episode by cost, failures last) that"
+        " each parameter explains on its own; up to the line, chance alone would do. Episodes"
+        " weigh as much as they vary the parameters. A parameter that the learner hardly varies"
+        " cannot show what it does."
     )
     return card(title, tag("div", *rows, class_="rows bars"), note=note)
 
@@ -120,12 +123,35 @@ def _row(name: str, explained: float, chance: float, reach: float) -> Markup:
     )
 
 
-def _explained(ranks: Array, values: Array, episode: npt.NDArray[np.int64]) -> Array:
-    """Return the share of each row's variance ``(rows, trials)`` that a parabola explains."""
-    powers = _centred(np.stack([values, np.square(values - values.mean())]), episode)
+def _places(ranks: Array, episode: npt.NDArray[np.int64]) -> Array:
+    """Return each trial's place among its episode's ``(trials,)``, -0.5 to 0.5, ties alike."""
+    places = np.zeros(len(ranks))
+    for number in np.unique(episode):
+        members = episode == number
+        own = ranks[members]
+        below = (own[:, None] > own).sum(axis=1) - (own[:, None] < own).sum(axis=1)
+        places[members] = below / (2.0 * len(own))
+    return places
+
+
+def _weights(u: Array, episode: npt.NDArray[np.int64]) -> Array:
+    """Return how widely each trial's episode varies the parameters ``(trials,)``, root mean square.
+
+    Being common to all parameters, it makes none seem to matter more than another.
+    """
+    squares = np.mean(_centred(u.T, episode) ** 2, axis=0)
+    _, place = np.unique(episode, return_inverse=True)
+    means = np.bincount(place, weights=squares) / np.bincount(place)
+    weights: Array = np.sqrt(means)[place]
+    return weights
+
+
+def _explained(rows: Array, values: Array, weight: Array, episode: npt.NDArray[np.int64]) -> Array:
+    """Return the share of variance of weighted rows ``(rows, trials)`` that a parabola explains."""
+    powers = weight * _centred(np.stack([values, np.square(values - values.mean())]), episode)
     axes, sizes, _ = np.linalg.svd(powers.T, full_matrices=False)
     axes = axes[:, sizes > TINY]
-    shares: Array = np.sum((ranks @ axes) ** 2, axis=1) / np.sum(ranks**2, axis=1)
+    shares: Array = np.sum((rows @ axes) ** 2, axis=1) / np.sum(rows**2, axis=1)
     return shares
 
 
