@@ -141,6 +141,17 @@ def test_a_late_outcome_is_told_once_and_moves_the_search() -> None:
     assert late.recommend().theta == pytest.approx(0.7, abs=0.1)
 
 
+def test_what_is_recommended_is_where_the_next_episode_would_be_drawn() -> None:
+    learner = create("cmaes", Space.unit(3), BATCH, seed=1)
+    for _ in range(4):
+        batch(learner, bowl)
+    answer = learner.recommend().theta
+    learner.ask(1)
+    mixture = learner.snapshot()["mixture"]
+    assert isinstance(mixture, dict)
+    np.testing.assert_allclose(answer, mixture["means"][0], atol=1e-12)
+
+
 def test_failures_rank_behind_every_success() -> None:
     """Half of the box fails at no cost; the search stays in the other half."""
     learner = create("cmaes", Space.unit(3), BATCH, seed=2)

@@ -7,6 +7,7 @@ the package adapts.
 
 from __future__ import annotations
 
+import copy
 import enum
 import warnings
 from collections.abc import Mapping
@@ -117,7 +118,7 @@ class CMAES(EpisodicLearner):
             warnings.simplefilter("ignore")
             if self._strategy is None:
                 self._strategy = self._make()
-            self._tell_waiting(episode, trials)
+            self._told.update(self._tell_waiting(self._strategy, episode, trials))
             asked = self._strategy.ask(self.episode_length)
         self._solutions += [np.array(x) for x in asked]
         self._batch = np.array(asked)[:, : len(self.space)]
@@ -152,27 +153,31 @@ class CMAES(EpisodicLearner):
             options["popsize"] = max(POPULATION_MIN, self.episode_length)
         return cma.CMAEvolutionStrategy(n * [self.config.start], self.config.spread, options)
 
-    def _tell_waiting(self, episode: int, trials: Trials) -> None:
-        """Tell the package, as one generation, what it has not been told."""
+    def _tell_waiting(self, strategy: Any, episode: int, trials: Trials) -> list[int]:
+        """Tell a strategy, as one generation, what ours was not told; return whose numbers."""
         told = [k in self._told for k in trials.number.tolist()]
         waiting = np.flatnonzero(~np.array(told, dtype=np.bool_))
-        if len(waiting) < max(POPULATION_MIN, int(self._strategy.sp.weights.mu)):
-            return
-        numbers = trials.number[waiting].tolist()
+        if len(waiting) < max(POPULATION_MIN, int(strategy.sp.weights.mu)):
+            return []
+        numbers: list[int] = trials.number[waiting].tolist()
         solutions = [self._solutions[k] for k in numbers]
         cost = charged(trials, self.config.failures)[waiting]
         late = [i for i, k in enumerate(numbers) if k // self.episode_length < episode - 1]
-        self._strategy.tell(solutions, cost.tolist(), check_points=late)
-        self._told.update(numbers)
+        strategy.tell(solutions, cost.tolist(), check_points=late)
+        return numbers
 
     def _focus(self, trials: Trials) -> Focus:
-        """Return the distribution's mean and spread, once it has been told of a success."""
+        """Return the distribution that the next episode would be drawn from."""
         if self._strategy is None or not trials.success.any():
             return super()._focus(trials)
+        ahead = copy.deepcopy(self._strategy)
+        begun = -(-self._ledger.asked // self.episode_length)
+        with fitting(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            self._tell_waiting(ahead, begun, trials)
         n = len(self.space)
-        result = self._strategy.result
-        scale = np.maximum(np.asarray(result.stds, dtype=np.float64)[:n], SCALE_MIN)
-        return Focus(np.asarray(result.xfavorite, dtype=np.float64)[:n], scale)
+        scale = np.maximum(np.asarray(ahead.result.stds, dtype=np.float64)[:n], SCALE_MIN)
+        return Focus(np.asarray(ahead.result.xfavorite, dtype=np.float64)[:n], scale)
 
     def _model(self) -> Mapping[str, object]:
         mixture = None if self._strategy is None else gaussian(self._strategy, len(self.space))
