@@ -156,6 +156,7 @@ def test_failures_are_counted_by_kind_with_the_latest_to_look_at(facts: Facts, s
     page = see(failures.picture(facts))
     latest = facts.table["trial"][found["time"][-1]]
     assert f"trial {latest}" in page.text
+    assert f"shearline view {facts.path} --trial {latest}." in page.text
     assert "trial 26" in page.text
 
 

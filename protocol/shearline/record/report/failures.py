@@ -55,10 +55,11 @@ def picture(facts: Facts) -> Markup:
     if not found:
         said = count(int(facts.learning.sum()), "trial")
         return card(title, note=f"Nothing: {said}, and none of them failed or was lost.")
+    trial = facts.table["trial"][found[0].members[-1]]
     note = join(
         [
             "The trial to look at is the latest of its kind, the nearest to what is tried now: ",
-            tag("code", f"shearline view {facts.path}"),
+            tag("code", f"shearline view {facts.path} --trial {trial}"),
             ".",
         ]
     )
