@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shearline.record.partition import SIDE, Samples, decision, middle, samples_of, telling
+from shearline.record.partition import SIDE, Samples, decision, middle, plane, samples_of, telling
 
 N = 5
 
@@ -42,6 +42,24 @@ def test_a_slice_is_the_kernel_expansion_at_each_of_its_points(seed: int, pair: 
         assert values[row, column] == pytest.approx(expected, abs=1e-9)
 
 
+def test_a_slice_of_another_kind_of_filter_is_its_value_at_each_point() -> None:
+    rng = np.random.default_rng(4)
+    part = {
+        "kind": "network",
+        "hidden": rng.standard_normal((N, 3)).tolist(),
+        "hidden_offset": rng.standard_normal(3).tolist(),
+        "out": rng.standard_normal(3).tolist(),
+        "offset": 0.1,
+    }
+    values = decision({"partition": part}, np.full(N, 0.5), 1, 3)
+    assert values is not None
+    u = plane(np.full(N, 0.5), 1, 3)[SIDE + 2]  # second row from the top, third column
+    hidden = np.tanh((2.0 * u - 1.0) @ part["hidden"] + part["hidden_offset"])
+    assert values[1, 2] == pytest.approx(hidden @ part["out"] + 0.1)
+    assert u[1] == pytest.approx(2.5 / SIDE)
+    assert u[3] == pytest.approx(1.0 - 1.5 / SIDE)
+
+
 def test_what_is_not_known_is_not_drawn() -> None:
     at = np.full(N, 0.5)
     assert decision({}, at, 0, 1) is None
@@ -55,8 +73,14 @@ def test_what_is_not_known_is_not_drawn() -> None:
 def test_a_slice_goes_through_the_middle_of_what_is_good() -> None:
     samples = Samples(np.array([[0.1, 0.2], [0.3, 0.4], [0.9, 0.9]]), np.array([True, True, False]))
     assert middle({}, samples).tolist() == pytest.approx([0.2, 0.3])
-    mixture = {"weights": [0.2, 0.8], "means": [[0.0, 0.0], [0.6, 0.7]]}
-    assert middle({"mixture": mixture}, samples).tolist() == [0.6, 0.7]
+    part = {
+        "kind": "svm-rbf",
+        "support": [[0.3, 0.5], [0.9, 0.9]],
+        "dual": [1.0, 5.0],
+        "gamma": 9.0,
+        "intercept": 0.0,
+    }
+    assert middle({"partition": part}, samples).tolist() == [0.3, 0.4]
     nobody = Samples(samples.u, np.zeros(3, dtype=np.bool_))
     assert middle({}, nobody).tolist() == pytest.approx([0.3, 0.4])
 

@@ -3,11 +3,13 @@
 import errno
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -21,11 +23,15 @@ from shearline.protocol.link import open_router
 from shearline.protocol.messages import Message, TraceData
 from shearline.record import viewer
 from shearline.record.head import config_of
+from shearline.record.picture import Picture
+from shearline.record.reader import Trace, to_trace
 from shearline.record.screenshot import screenshot
-from shearline.record.view import APPLICATION, follow, save, view
+from shearline.record.view import APPLICATION, connected, follow, save, view
 from shearline.record.writer import RecordWriter
 
 Messages = Callable[..., list[Message]]
+#: What one of the traces below comes to in the stream, roughly [bytes].
+BYTES_DRAWN = 80_000
 
 
 def rerun(*arguments: str) -> str:
@@ -186,13 +192,80 @@ def test_there_is_nothing_to_follow_without_a_learner() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("pages", [(), ("best", "failure")], ids=["run", "two trials"])
 def test_the_picture_shows_curves_and_not_an_empty_window(
-    write_run: Callable[..., Path], tmp_path: Path
+    pages: tuple[str, ...], write_run: Callable[..., Path], tmp_path: Path
 ) -> None:
     full = tmp_path / "full.png"
     try:
-        screenshot(write_run(), full, trial=3)
+        screenshot(write_run(), full, trial=3, pages=pages, at_s=0.5)
     except RecordError as error:
         pytest.skip(str(error))
     # curves, text and a scene do not compress to what an empty dark window does
     assert full.stat().st_size > 60_000
+
+
+def test_trials_that_were_asked_for_have_a_page_of_their_own(
+    write_run: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = tmp_path / "run.rrd"
+    save(write_run(), path, trials=("best", "failure"))
+    listed = rerun("rrd", "print", "-vv", str(path))
+    for root in ("/a", "/b"):
+        for entity in ("card", "phase", "signals/tau_ext", "scene/path", "scene/force"):
+            assert f"{root}/{entity}" in listed, entity
+
+
+def test_a_trial_that_is_not_there_is_one_clear_error(
+    write_run: Callable[..., Path], tmp_path: Path
+) -> None:
+    with pytest.raises(RecordError, match=r"no trial '99' in this run: expected a number up to 7"):
+        save(write_run(), tmp_path / "run.rrd", trials=("99",))
+
+
+@contextmanager
+def a_viewer() -> Iterator[tuple[subprocess.Popen[bytes], int]]:
+    """A viewer without its window: what takes a stream and keeps it."""
+    port = viewer.free_port()
+    with viewer.quiet_environment() as environment:
+        child = subprocess.Popen(
+            [viewer.executable(), "--serve-grpc", "--bind", "127.0.0.1", "--port", str(port)],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            yield child, port
+        finally:
+            child.kill()
+            child.wait()
+
+
+def draw_for(picture: Picture, trace: Trace, times: int) -> float:
+    """Draw one trace again and again; return how much memory that took for good [MB]."""
+    before = resident_mb()
+    for _ in range(times):
+        picture.trace(trace)
+        picture.flush()
+    return resident_mb() - before
+
+
+def resident_mb() -> float:
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+@pytest.mark.slow
+@pytest.mark.chaos
+@pytest.mark.parametrize("harm", [signal.SIGSTOP, signal.SIGKILL])
+def test_a_viewer_that_is_stopped_or_killed_blocks_nobody_and_fills_no_memory(
+    harm: signal.Signals, messages: Messages
+) -> None:
+    said = next(message for message in messages(hz=1000) if isinstance(message, TraceData))
+    trace, drawn = to_trace(said), 500
+    with a_viewer() as (child, port):
+        picture = Picture(connected(port), None)
+        draw_for(picture, trace, 20)
+        child.send_signal(harm)
+        grown_mb = draw_for(picture, trace, drawn)  # it comes back: nobody waited for the viewer
+    assert grown_mb < 0.5 * drawn * BYTES_DRAWN / 1e6

@@ -1,7 +1,7 @@
 """How a learner parts the space, evaluated from its snapshot alone.
 
-A snapshot is plain numbers; of the kinds of filter, those written down here can be drawn. No
-learner is known: what reads a record must not need what wrote it.
+Which samples it rests on, which parameters tell, and what a slice through it shows. The kinds of
+filter are known elsewhere; no learner is.
 """
 
 from __future__ import annotations
@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shearline.record.report.decision import decision_of
+
 Array = npt.NDArray[np.float64]
 
 #: Points along each side of a slice: finer than a screen's patience, coarser than its pixels.
 SIDE = 72
+STEPS = (np.arange(SIDE) + 0.5) / SIDE
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +48,9 @@ def samples_of(model: Mapping[str, Any]) -> Samples | None:
 def decision(model: Mapping[str, Any], at: Array, x: int, y: int) -> Array | None:
     """Return the filter's values on one slice, at least 0 where it accepts.
 
-    Along a slice only two coordinates change, and the kernel ``exp(-gamma |u - s|^2)`` is the
-    product of its coordinates' shares: the slice costs two small products instead of a kernel
-    between all points and all supports.
+    Along a slice only two coordinates change, and a support vector machine's kernel
+    ``exp(-gamma |u - s|^2)`` is the product of its coordinates' shares: its slice costs two small
+    products instead of a kernel between all points and all supports.
 
     Args:
         model: A snapshot.
@@ -58,36 +61,44 @@ def decision(model: Mapping[str, Any], at: Array, x: int, y: int) -> Array | Non
     Returns:
         ``(SIDE, SIDE)``; ``None`` while there is no filter, or where its kind is not known here.
     """
-    part = model.get("partition")
-    if not isinstance(part, Mapping) or part.get("kind") != "svm-rbf":
+    decide = decision_of(model, len(at))
+    if decide is None:
         return None
-    support = np.asarray(part["support"], dtype=np.float64)
-    if support.ndim != 2 or support.shape[1] != len(at):
-        return None
-    gamma = float(part["gamma"])
-    steps = (np.arange(SIDE) + 0.5) / SIDE
-    rest = np.delete(support - at, [x, y], axis=1)
-    weight = np.asarray(part["dual"], dtype=np.float64) * np.exp(-gamma * np.sum(rest**2, axis=1))
-    along_x = np.exp(-gamma * (steps[:, None] - support[:, x]) ** 2)
-    along_y = np.exp(-gamma * (steps[::-1, None] - support[:, y]) ** 2)
-    values: Array = (along_y * weight) @ along_x.T + float(part["intercept"])
-    return values
+    if model["partition"]["kind"] == "svm-rbf":
+        return _separable(model["partition"], at, x, y)
+    return decide(plane(at, x, y)).reshape(SIDE, SIDE)
+
+
+def plane(at: Array, x: int, y: int) -> Array:
+    """Return the tuples ``(SIDE * SIDE, n)`` of a slice, rows from high ``y`` to low."""
+    u = np.tile(at, (SIDE * SIDE, 1))
+    u[:, x] = np.tile(STEPS, SIDE)
+    u[:, y] = np.repeat(STEPS[::-1], SIDE)
+    return u
 
 
 def middle(model: Mapping[str, Any], samples: Samples) -> Array:
     """Return the tuple ``(n,)`` that slices go through: the middle of what is good.
 
-    The mean of the heaviest component of the proposal mixture, else the median of the good
-    samples, else of all.
+    Of the good samples (of all, where none is good) the one that the filter accepts most, so that
+    a slice shows what is accepted if anything is; without a filter their median.
     """
-    mixture = model.get("mixture")
-    if isinstance(mixture, Mapping) and mixture.get("weights"):
-        mean = np.asarray(mixture["means"], dtype=np.float64)[int(np.argmax(mixture["weights"]))]
-        if mean.shape == samples.u.shape[1:]:
-            return np.array(mean)
     chosen = samples.u[samples.good] if samples.good.any() else samples.u
+    decide = decision_of(model, chosen.shape[1])
+    if decide is not None:
+        return np.array(chosen[int(np.argmax(decide(chosen)))])
     median: Array = np.median(chosen, axis=0)
     return median
+
+
+def _separable(part: Mapping[str, Any], at: Array, x: int, y: int) -> Array:
+    support, gamma = np.array(part["support"], dtype=np.float64), float(part["gamma"])
+    rest = np.delete(support - at, [x, y], axis=1)
+    weight = np.array(part["dual"]) * np.exp(-gamma * np.sum(rest**2, axis=1))
+    along_x = np.exp(-gamma * (STEPS[:, None] - support[:, x]) ** 2)
+    along_y = np.exp(-gamma * (STEPS[::-1, None] - support[:, y]) ** 2)
+    values: Array = (along_y * weight) @ along_x.T + float(part["intercept"])
+    return values
 
 
 def telling(u: Array, success: Sequence[bool] | npt.NDArray[np.bool_]) -> list[int]:
