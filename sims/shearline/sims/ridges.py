@@ -122,7 +122,7 @@ def sparse(seed: int, n: int = N) -> Ridge:
     rng = np.random.default_rng(np.random.SeedSequence([seed, n, 3]))
     centre = rng.uniform(-0.2, 0.0, 8)
     axes = _axes(rng, n, 8, rotated=False)
-    return Ridge(axes, centre, width=0.22, strip_at=0.3, strip_everywhere=False)
+    return Ridge(axes, centre, width=0.195, strip_at=0.3, strip_everywhere=False)
 
 
 #: Names of the three kinds.

@@ -49,17 +49,19 @@ class Cost:
     unit: float
     log_floor: float
 
+    @property
+    def noise(self) -> float:
+        """Share of the (warped) costs' variance that the process does not explain, 0 to 1."""
+        return min(1.0, float(np.exp(self.parts[3])))
+
     def mean(self, u: Array) -> Array:
         """Return the expected cost (the median, where logarithms are used) of ``(m, n)``."""
-        return self.at(u, 0.0)
+        return self._unwarp(self._cross(2.0 * u - 1.0) @ self.weights)
 
     def at(self, u: Array, pessimism: float) -> Array:
         """Return the cost ``(m,)`` so many standard deviations above the mean."""
         cross = self._cross(2.0 * u - 1.0)
-        value: Array = cross @ self.weights
-        if pessimism:
-            value = value + pessimism * self._deviation(u, cross)
-        return self._unwarp(value)
+        return self._unwarp(cross @ self.weights + pessimism * self._deviation(u, cross))
 
     def deviation(self, u: Array) -> Array:
         """Return the posterior deviation ``(m,)`` of the warped cost, in units of its spread."""
@@ -73,11 +75,14 @@ class Cost:
         square, curve, smooth = np.exp(self.parts[:3])
         prior = square * np.sum(x**2 + x**4, axis=1) + curve + smooth
         explained = np.sum((cross @ self.factor.T) ** 2, axis=1)
-        return np.sqrt(np.maximum(prior - explained, 0.0))
+        deviation: Array = np.sqrt(np.maximum(prior - explained, 0.0))
+        return deviation
 
     def _unwarp(self, value: Array) -> Array:
-        cost = self.offset + self.unit * value
-        return cost if np.isnan(self.log_floor) else np.exp(cost) - self.log_floor
+        cost: Array = self.offset + self.unit * value
+        if not np.isnan(self.log_floor):
+            cost = np.asarray(np.exp(cost) - self.log_floor, dtype=np.float64)
+        return cost
 
 
 def fit_cost(u: Array, cost: Array) -> Cost:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shearline.learner.base import Array
+from shearline.learner.ledger import Trials
 from shearline.learner.region import fold
 
 #: Least deviation of a proposal along any axis, in edges of the cube.
@@ -35,11 +36,6 @@ class Elite:
         lengths: Array = np.sqrt(np.sum(self.factor**2, axis=1))
         return lengths
 
-    def standardise(self, u: Array) -> Array:
-        """Return tuples ``(m, n)`` in deviations from the centre."""
-        offset: Array = (u - self.centre) / self.deviation
-        return offset
-
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """Return ``(count, n)`` draws, folded back into the cube."""
         normal = rng.standard_normal((count, len(self.centre)))
@@ -53,12 +49,22 @@ class Elite:
         }
 
 
-def elite_size(episode_length: int, n: int, successes: int) -> int:
+def elite_size(episode_length: int, n: int, successes: int, noise: float) -> int:
     """Return how many successes make the elite.
 
-    Half of an episode, but enough to say something about ``n`` spreads.
+    Half of an episode, but enough to say something about ``n`` spreads, where costs can be
+    trusted. The more of them is noise, the more the choice among successes is luck: towards
+    half of all successes, so that the elite does not narrow on nothing.
+
+    Args:
+        episode_length: Trials of an episode.
+        n: Number of parameters.
+        successes: How many there are.
+        noise: Share of the costs' variance that no model explains, 0 to 1.
     """
-    return min(max(episode_length // 2, n // 2 + 5), successes)
+    least = max(episode_length // 2, n // 2 + 5)
+    most = max(least, successes // 2)
+    return min(least + round(noise * (most - least)), successes)
 
 
 def rank_weights(count: int) -> Array:
@@ -90,3 +96,16 @@ def fit_elite(u: Array, spread: float) -> Elite:
     covariance = (1.0 - share) * raw
     covariance[np.diag_indices(n)] = np.maximum(np.diag(raw), DEVIATION_MIN**2)
     return Elite(centre, spread * np.linalg.cholesky(covariance))
+
+
+def cheapest(trials: Trials, episode_length: int, spread: float) -> Elite:
+    """Return an elite of the successes that were cheapest: where to look before there is a model.
+
+    Args:
+        trials: At least one succeeded.
+        episode_length: Trials of an episode.
+        spread: Factor on the deviations.
+    """
+    won = trials.where(trials.success)
+    count = elite_size(episode_length, won.u.shape[1], len(won), noise=0.0)
+    return fit_elite(won.u[np.argsort(won.cost, kind="stable")[:count]], spread)

@@ -5,6 +5,7 @@ A model is a value: making one draws nothing and changes nothing.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,15 +13,16 @@ import numpy.typing as npt
 
 from shearline.learner.base import Array
 from shearline.learner.ledger import Trials
-from shearline.learner.psp.machine import Machine
 from shearline.learner.ranked.config import RankedConfig
 from shearline.learner.ranked.cost import Cost, fit_cost
-from shearline.learner.ranked.elite import Elite, elite_size, fit_elite
-from shearline.learner.ranked.ranking import fit_ranking
+from shearline.learner.ranked.elite import Elite, cheapest, elite_size, fit_elite
 from shearline.learner.ranked.reliability import Reliability, fit_reliability
 from shearline.learner.ranked.score import failure_price, score
 from shearline.learner.ranked.window import window
 from shearline.learner.threads import fitting
+
+#: Least length that counts as one step when trials are looked for, in edges of the cube.
+STEP_MIN = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +36,9 @@ class Model:
         cost: Cost of a success.
         price: What a failure costs.
         elite: Where the next trials are drawn from.
-        ranking: The partition; ``None`` while everything is elite.
+        threshold: Score of the last of the elite; what scores less is the good part of the space.
+        pessimism: Deviations by which the chance of success is taken too low.
+        heeded: Whether that chance counts in the score at all.
     """
 
     trials: Trials
@@ -43,24 +47,38 @@ class Model:
     cost: Cost
     price: float
     elite: Elite
-    ranking: Machine | None
+    threshold: float
+    pessimism: float
+    heeded: bool
 
-    def score(self, u: Array, config: RankedConfig) -> Array:
+    def score(self, u: Array) -> Array:
         """Return the expected cost of one success for tuples ``(m, n)`` as ``(m,)``."""
-        p = self.reliability.probability(u, config.pessimism)
-        return score(self.cost.mean(u), p, self.price)
+        return score(self.cost.mean(u), self.chance(u), self.price)
 
-    def choose(self, u: Array, config: RankedConfig) -> Array:
-        """Return the one of the proposals ``(m, n)`` to try.
+    def chance(self, u: Array) -> Array:
+        """Return the chance of success that the score goes by, ``(m,)``."""
+        if not self.heeded:
+            return np.ones(len(u))
+        return self.reliability.probability(u, self.pessimism)
 
-        The half of them with the lower expected cost stay; the partition's favourite wins.
-        """
-        worth = self.score(u, config)
-        better = np.argsort(worth, kind="stable")[: (len(u) + 1) // 2]
-        if self.ranking is None or not config.use_svm:
-            return np.array(u[better[0]])
-        values = self.ranking.decision(self.elite.standardise(u[better]))
-        return np.array(u[better[int(np.argmax(values))]])
+    def first(self, u: Array) -> Array:
+        """Return the tuple ``(n,)`` of ``(m, n)`` that ranks first; ties go to the earlier."""
+        return np.array(u[int(np.argmin(self.score(u)))])
+
+    def snapshot(self) -> Mapping[str, object]:
+        """Return elite, samples and the reliability's weights as plain values."""
+        return {
+            "elite": dict(self.elite.snapshot()),
+            "price": self.price,
+            "threshold": self.threshold,
+            "reliability": dict(self.reliability.snapshot()),
+            "samples": {
+                "trial": self.trials.number.tolist(),
+                "u": self.trials.u.tolist(),
+                "cost": self.trials.cost.tolist(),
+                "good": self.good.tolist(),
+            },
+        }
 
 
 def fit_model(
@@ -69,41 +87,50 @@ def fit_model(
     """Make the model.
 
     Args:
-        trials: Everything told; at least one succeeded.
+        trials: Everything told; at least two succeeded.
         stand: Where the learner stood before, if it stood anywhere.
         episode_length: Trials of an episode.
         config: Its numbers.
     """
-    n = trials.u.shape[1]
     if stand is None:
-        cheap = trials.where(trials.success)
-        order = np.argsort(cheap.cost, kind="stable")[: elite_size(episode_length, n, len(cheap))]
-        stand = fit_elite(cheap.u[order], config.spread)
-    scale = np.maximum(stand.deviation, 1e-3)
-    seen = window(trials, stand.centre, scale, config.window)
-    if not seen.success.any():
-        seen = window(trials.where(trials.success), stand.centre, scale, config.window)
+        stand = cheapest(trials, episode_length, config.spread)
+    step = np.maximum(stand.deviation, STEP_MIN)
+    seen = window(trials, stand.centre, step, config.window)
+    won = window(trials.where(trials.success), stand.centre, step, config.cost_window)
     with fitting():
-        return _fit(seen, stand.centre, scale, episode_length, config)
+        return _fit(seen, won, episode_length, config)
 
 
-def _fit(
-    seen: Trials, centre: Array, scale: Array, episode_length: int, config: RankedConfig
-) -> Model:
-    won = seen.where(seen.success)
-    costed = window(won, centre, scale, config.cost_window)
-    reliability = fit_reliability(seen.u, seen.success)
-    cost = fit_cost(costed.u, costed.cost)
-    price = failure_price(seen)
-    worth = score(
-        cost.mean(won.u) if config.use_gp else won.cost,
-        reliability.probability(won.u, config.pessimism if config.use_p else 1.0),
-        price,
-    )
-    size = elite_size(episode_length, seen.u.shape[1], len(won))
+def _fit(seen: Trials, won: Trials, episode_length: int, config: RankedConfig) -> Model:
+    reliability = fit_reliability(seen, won)
+    cost = fit_cost(won.u, won.cost)
+    price = failure_price(seen, won)
+    chance = reliability.probability(won.u, config.pessimism)
+    expected = cost.mean(won.u) if config.cost else won.cost
+    worth = score(expected, chance if config.reliability else np.ones(len(won)), price)
+    size = elite_size(episode_length, won.u.shape[1], len(won), cost.noise)
     order = np.argsort(worth, kind="stable")[:size]
-    elite = fit_elite(won.u[order], config.spread)
-    good = np.zeros(len(seen), dtype=np.bool_)
-    good[np.flatnonzero(seen.success)[order]] = True
-    ranking = fit_ranking(elite.standardise(seen.u), good, config)
-    return Model(seen, good, reliability, cost, price, elite, ranking)
+    return Model(
+        trials=seen,
+        good=np.isin(seen.number, won.number[order]),
+        reliability=reliability,
+        cost=cost,
+        price=price,
+        elite=fit_elite(won.u[order], widened(config, reliability.probability(won.u[order]))),
+        threshold=float(worth[order[-1]]),
+        pessimism=config.pessimism,
+        heeded=config.reliability,
+    )
+
+
+def widened(config: RankedConfig, chance: Array) -> float:
+    """Return the factor on the elite's deviations.
+
+    An elite that fails now and then has not arrived: what it does not vary it cannot learn, so
+    it is widened by twice the share in which it is expected to fail, up to ``widening``.
+
+    Args:
+        config: Spread and widening.
+        chance: Expected success ``(k,)`` of the elite.
+    """
+    return config.spread * (1.0 + min(config.widening, 2.0 * (1.0 - float(chance.mean()))))

@@ -1,4 +1,4 @@
-"""The ranked learner: draw around the elite, rank by the partition, never trust a lucky success."""
+"""The ranked learner: draw around the elite, try what ranks first, never trust a lucky success."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ from shearline.learner.episodic import EpisodicLearner
 from shearline.learner.ledger import Trials
 from shearline.learner.lhs import latin_hypercube
 from shearline.learner.ranked.config import RankedConfig
+from shearline.learner.ranked.elite import Elite
 from shearline.learner.ranked.model import Model, fit_model
 from shearline.learner.recommend import Focus
 from shearline.learner.region import fold
 from shearline.protocol.space import Space
+
+#: Least spread that is claimed around a recommendation, in edges of the cube.
+SCALE_MIN = 1e-3
 
 
 class RankedPSP(EpisodicLearner):
@@ -35,7 +39,7 @@ class RankedPSP(EpisodicLearner):
         super().__init__(space, episode_length, seed)
         self.config = config
         self._design: Array = np.empty((0, len(space)))
-        self._model_now: Model | None = None
+        self._belief: Model | None = None
         self._wins: Array = np.empty((0, len(space)))
 
     def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
@@ -46,16 +50,18 @@ class RankedPSP(EpisodicLearner):
     def _renew(self, trials: Trials) -> None:
         self._wins = trials.u[trials.success]
         if len(self._wins) >= self.config.wins_min:
-            stand = None if self._model_now is None else self._model_now.elite
-            self._model_now = fit_model(trials, stand, self.episode_length, self.config)
+            stand = self._stand()
+            self._belief = fit_model(trials, stand, self.episode_length, self.config)
+
+    def _stand(self) -> Elite | None:
+        return None if self._belief is None else self._belief.elite
 
     def _draw(self, index: int, rng: np.random.Generator) -> Array:
         if self.config.refresh and index and index % self.config.refresh == 0:
             self._renew(self._ledger.trials())
-        if self._model_now is None:
+        if self._belief is None:
             return self._scout(index, rng)
-        block = self._model_now.elite.draw(rng, self.config.draws)
-        return self._model_now.choose(block, self.config)
+        return self._belief.first(self._belief.elite.draw(rng, self.config.draws))
 
     def _scout(self, index: int, rng: np.random.Generator) -> Array:
         """Return a tuple of the design or, every other time, one near a success."""
@@ -66,29 +72,16 @@ class RankedPSP(EpisodicLearner):
         return np.array(self._design[index])
 
     def _focus(self, trials: Trials) -> Focus:
+        """Return the elite that the next episode would draw from."""
         if int(trials.success.sum()) < self.config.wins_min:
             return super()._focus(trials)
-        stand = None if self._model_now is None else self._model_now.elite
-        model = fit_model(trials, stand, self.episode_length, self.config)
-        return Focus(model.elite.centre, np.maximum(model.elite.deviation, 1e-3))
+        elite = fit_model(trials, self._stand(), self.episode_length, self.config).elite
+        return Focus(elite.centre, np.maximum(elite.deviation, SCALE_MIN))
 
     def _model(self) -> Mapping[str, object]:
-        model = self._model_now
-        plain: dict[str, object] = {"config": asdict(self.config)}
-        if model is None:
-            return plain | {"proposal": "scouts"}
-        return plain | {
-            "proposal": "elite",
-            "elite": dict(model.elite.snapshot()),
-            "price": model.price,
-            "partition": None if model.ranking is None else dict(model.ranking.snapshot()),
-            "samples": {
-                "trial": model.trials.number.tolist(),
-                "u": model.trials.u.tolist(),
-                "cost": model.trials.cost.tolist(),
-                "good": model.good.tolist(),
-            },
-        }
+        if self._belief is None:
+            return {"config": asdict(self.config), "proposal": "scouts"}
+        return {"config": asdict(self.config), "proposal": "elite", **self._belief.snapshot()}
 
 
 def ranked(space: Space, episode_length: int = 20, seed: int = 0, **switches: object) -> RankedPSP:

@@ -13,12 +13,14 @@ distribution, each with a precision of its own that is found by expectation maxi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from shearline.learner.base import Array
+from shearline.learner.ledger import Trials
 
 #: Steps of Newton, and rounds in which the prior is renewed after them.
 NEWTON_STEPS = 12
@@ -65,6 +67,14 @@ class Reliability:
         """Return the posterior's standard deviation ``(m,)`` of the log-odds."""
         return self._deviation(features(u, self.centre, self.scale))
 
+    def snapshot(self) -> Mapping[str, object]:
+        """Return the function as plain values; ``weights`` belong to :func:`features`."""
+        return {
+            "centre": self.centre.tolist(),
+            "scale": self.scale.tolist(),
+            "weights": self.mean.tolist(),
+        }
+
     def _deviation(self, phi: Array) -> Array:
         variance: Array = np.sum((phi @ self.covariance) * phi, axis=1)
         return np.sqrt(np.maximum(variance, 0.0))
@@ -92,16 +102,15 @@ def sigmoid(logit: Array) -> Array:
     return result
 
 
-def fit_reliability(u: Array, success: npt.NDArray[np.bool_]) -> Reliability:
+def fit_reliability(seen: Trials, won: Trials) -> Reliability:
     """Fit the posterior.
 
     Args:
-        u: Tuples ``(m, n)`` in unit coordinates.
-        success: What became of them ``(m,)``; at least one succeeded.
+        seen: What it rests on, m trials.
+        won: Successes whose middle and deviations it is measured by; at least one.
     """
-    won = u[success]
-    centre, scale = won.mean(axis=0), np.maximum(won.std(axis=0), SCALE_MIN)
-    phi = features(u, centre, scale)
+    centre, scale = won.u.mean(axis=0), np.maximum(won.u.std(axis=0), SCALE_MIN)
+    phi, success = features(seen.u, centre, scale), seen.success
     precision = np.full(phi.shape[1], NARROW)
     precision[:2] = WIDE
     mean = np.zeros(phi.shape[1])
@@ -125,8 +134,8 @@ def _laplace(
         mean = mean + step * min(1.0, 5.0 / max(float(np.abs(step).max()), 1e-12))
         if float(np.abs(step).max()) < 1e-6:
             break
-    covariance: Array = np.linalg.inv(_curvature(phi, sigmoid(phi @ mean), precision))
-    return mean, covariance
+    covariance = np.linalg.inv(_curvature(phi, sigmoid(phi @ mean), precision))
+    return mean, covariance.astype(np.float64, copy=False)
 
 
 def _curvature(phi: Array, p: Array, precision: Array) -> Array:

@@ -18,15 +18,16 @@ CHANCE_MIN = 0.05
 PRICE_SPREADS = 10.0
 
 
-def failure_price(trials: Trials) -> float:
+def failure_price(seen: Trials, won: Trials) -> float:
     """Return F: what a failed trial costs more than the cheapest success.
 
     Args:
-        trials: At least one of them succeeded.
+        seen: Trials of both kinds.
+        won: Successes, at least one.
     """
-    won, lost = trials.cost[trials.success], trials.cost[~trials.success]
-    spread = float(np.quantile(won, 0.9) - np.quantile(won, 0.1))
-    charged = float(lost.mean() - won.min()) if len(lost) else 0.0
+    lost = seen.cost[~seen.success]
+    spread = float(np.quantile(won.cost, 0.9) - np.quantile(won.cost, 0.1))
+    charged = float(lost.mean() - won.cost.min()) if len(lost) else 0.0
     return max(charged, PRICE_SPREADS * spread)
 
 

@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shearline.learner.base import Array
+from shearline.learner.ledger import Trials
+from shearline.learner.ranked.reliability import Reliability, fit_reliability
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def tried(seed: int, count: int, n: int = 4) -> Trials:
+    """Return trials that succeed near the middle of the cube, more often than not."""
+    rng = np.random.default_rng(seed)
+    u = rng.random((count, n))
+    success = np.linalg.norm(u - 0.5, axis=1) + 0.05 * rng.standard_normal(count) < 0.55
+    success[0] = True
+    return Trials(np.arange(count), u, np.ones(count), success)
+
+
+def fitted(trials: Trials) -> Reliability:
+    return fit_reliability(trials, trials.where(trials.success))
+
+
+def middle_and_corner(n: int = 4) -> Array:
+    return np.array([np.full(n, 0.5), np.ones(n)])
+
+
+@given(SEEDS)
+def test_probabilities_are_probabilities_and_pessimism_lowers_them(seed: int) -> None:
+    trials = tried(seed, 30)
+    model, u = fitted(trials), np.random.default_rng(seed).random((20, 4))
+    hopeful, wary = model.probability(u), model.probability(u, 1.0)
+    assert np.all((wary >= 0.0) & (hopeful <= 1.0))
+    assert np.all(wary <= hopeful)
+
+
+@given(SEEDS)
+def test_the_middle_of_what_succeeded_is_more_reliable_than_a_corner(seed: int) -> None:
+    middle, corner = fitted(tried(seed, 200)).probability(middle_and_corner())
+    assert middle > corner
+
+
+def test_more_trials_leave_less_doubt() -> None:
+    doubt = [
+        np.mean([fitted(tried(k, m)).deviation(middle_and_corner())[0] for k in range(20)])
+        for m in (20, 100, 500)
+    ]
+    assert doubt[0] > doubt[1] > doubt[2]
+
+
+@given(SEEDS, st.booleans())
+def test_one_kind_of_outcome_is_no_certainty(seed: int, success: bool) -> None:  # noqa: FBT001
+    trials = tried(seed, 30)
+    same = Trials(trials.number, trials.u, trials.cost, np.full(30, success))
+    p = fit_reliability(same, trials).probability(trials.u)
+    assert np.all((p > 0.0) & (p < 1.0))
+
+
+@given(SEEDS)
+def test_the_order_of_parameters_means_nothing(seed: int) -> None:
+    trials, order = tried(seed, 40), np.array([2, 0, 3, 1])
+    turned = Trials(trials.number, trials.u[:, order], trials.cost, trials.success)
+    np.testing.assert_allclose(
+        fitted(turned).probability(turned.u), fitted(trials).probability(trials.u), rtol=1e-4
+    )
