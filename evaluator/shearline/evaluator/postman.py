@@ -30,6 +30,7 @@ from shearline.evaluator.mail import (
     Quit,
     Run,
     Send,
+    Started,
     Tick,
 )
 from shearline.evaluator.mailbox import Mailbox
@@ -77,6 +78,8 @@ class Exchange:
         jobs: For the trial's thread: what to run, what to prepare, or the end.
         postman: Speaks for this evaluator in the run that goes on, if one does.
         is_busy: Whether the trial's thread has something else to do than to wait at the intake.
+        running: Token of the trial that runs, or ``""``; the postman's thread looks now and then,
+            so that a short trial need not be spoken of.
         is_open: Whether a trial may begin.
         abort_why: Why the running trial is to end at its next beat, or ``""``.
         leaving: What a signal asked for.
@@ -91,6 +94,7 @@ class Exchange:
     lock: threading.Lock = field(default_factory=threading.Lock)
     postman: Postman | None = None
     is_busy: bool = True
+    running: str = ""
     is_open: bool = True
     abort_why: str = ""
     leaving: Leave | None = None
@@ -229,6 +233,9 @@ class Postman:
         with exchange.lock:
             if exchange.is_busy:
                 self.clear()  # first: what came during a trial is renewed with it
+                running = self._mailbox.running
+                if exchange.running and (running is None or running.token != exchange.running):
+                    self.take(Started(exchange.running))
             while not exchange.inbox.empty():
                 self.take(exchange.inbox.get_nowait())
             self.take(Tick())

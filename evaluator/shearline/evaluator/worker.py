@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from shearline.evaluator.base import Task, Trace, TrialAborted
 from shearline.evaluator.builtin import builtin_task
 from shearline.evaluator.local import Verdict, run_trial
-from shearline.evaluator.mail import Beat, Ended, Prepare, Ready, Run, Started
+from shearline.evaluator.mail import Beat, Ended, Prepare, Ready, Run
 from shearline.evaluator.mailbox import RENEW_LEASES, Mailbox
 from shearline.evaluator.postman import End, Exchange, Postman
 from shearline.evaluator.showing import TRACE_HZ, Showing
@@ -203,9 +203,10 @@ class Worker:
         if exchange.abort_why:
             verdict = Verdict(OutcomeKind.ABORTED, why=f"not begun: {exchange.abort_why}")
         else:
-            exchange.tell(Started(trial.token))
+            exchange.running = trial.token
             self._deadline_s = time.monotonic() + trial.deadline_s
             verdict = run_trial(self._task, trial.theta, trial.seed, self._beat, self._space)
+            exchange.running = ""
         exchange.tell(Ended(self._result(trial, verdict)))
         self._log(trial, verdict)
         if self._config.traces and verdict.trace is not None:

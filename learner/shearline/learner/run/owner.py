@@ -134,7 +134,6 @@ class Owner:
             items = self._left or self._inbox.take()
             began_s, self._left = time.perf_counter(), []
             out: list[Instruction] = []
-            self.dispatcher.desk.is_observed = self._outgoing.is_observed()
             for number, item in enumerate(items, start=1):
                 if isinstance(item, Hurry):
                     return
@@ -150,6 +149,7 @@ class Owner:
                 out += self.dispatcher.handle(Tick(), self._now_s())
             self._carry_out(out)
             self._tell(began_cpu_s + STEP_TELLS_S)
+            self.dispatcher.desk.is_observed = self._outgoing.is_observed()
             if self._now_s() >= self._next_status_s:
                 self._show()
             cpu_s = time.thread_time() - began_cpu_s
