@@ -49,8 +49,11 @@ class Shape:
     titles: Sequence[str] = ()
 
 
-def layout(shape: Shape, *, active_tab: int = 0) -> rrb.Blueprint:
-    """Return the layout; pages of single trials stand first, tab ``active_tab`` in front."""
+def layout(shape: Shape, *, active_tab: int = 0, live: bool = False) -> rrb.Blueprint:
+    """Return the layout; pages of single trials stand first, tab ``active_tab`` in front.
+
+    Of a ``live`` run the cursor follows the newest trial until somebody moves it.
+    """
     tabs = [
         *([_pages(shape)] if shape.trials else []),
         _trials(shape),
@@ -62,7 +65,11 @@ def layout(shape: Shape, *, active_tab: int = 0) -> rrb.Blueprint:
     timeline = page.CLOCK if shape.trials and active_tab == 0 else "trial"
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=active_tab),
-        rrb.TimePanel(timeline=timeline, state="collapsed", play_state="paused"),
+        rrb.TimePanel(
+            timeline=timeline,
+            state="collapsed",
+            play_state="following" if live else "paused",
+        ),
         collapse_panels=True,
     )
 
@@ -147,7 +154,10 @@ def _tip(root: str, name: str, shape: Shape) -> rrb.Spatial3DView:
 
 def _arm(root: str) -> rrb.Spatial3DView:
     eye = rrb.EyeControls3D(
-        kind="Orbital", position=(1.15, -0.95, 0.75), look_target=(0.27, 0.0, 0.36), eye_up=(0, 0, 1)
+        kind="Orbital",
+        position=(1.15, -0.95, 0.75),
+        look_target=(0.27, 0.0, 0.36),
+        eye_up=(0, 0, 1),
     )
     return rrb.Spatial3DView(origin=f"/{root}", name="scene", eye_controls=eye, line_grid=False)
 

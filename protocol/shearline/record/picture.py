@@ -71,6 +71,7 @@ class Picture:
         self._outcomes: dict[int, OutcomeKind | None] = {}
         self._tuples: dict[tuple[str, tuple[str, ...], int], list[list[float]]] = {}
         self._last_trial = 0
+        self._last_of: dict[int, int] = {}  # episode to its last trial with an outcome
         self._goal = Goal.of(settings)
         self._panels = Panels(self._sheet)
         self._slices = Slices(self._sheet, config)
@@ -93,6 +94,8 @@ class Picture:
         """Draw the outcome of one trial: its points in the plots and its card."""
         self._outcomes[counted.trial] = counted.kind
         self._last_trial = max(self._last_trial, counted.trial)
+        last = self._last_of.get(counted.episode, counted.trial)
+        self._last_of[counted.episode] = max(last, counted.trial)
         at = {**self._at(counted.trial), "clock": counted.at_s}
         self._sheet.row("card", at, rr.TextDocument, text=[card(counted, self._config)])
         if counted.kind is None:
@@ -107,9 +110,9 @@ class Picture:
         found = self._tuples.setdefault((kind, tuple(at), len(counted.theta)), [])
         found.append([*at.values(), *counted.theta])
 
-    def episode(self, closed: EpisodeClosed, last_trial: int | None = None) -> None:
+    def episode(self, closed: EpisodeClosed) -> None:
         """Draw what an episode came to, at its last trial, with one standard error."""
-        last = self._last_trial if last_trial is None else last_trial
+        last = self._last_of.get(closed.episode, self._last_trial)
         self._sheet.stream.set_time("trial", sequence=last)
         self._sheet.stream.set_time("clock", timestamp=closed.at_s)
         # Agresti and Coull (1998): two more of each keep the error honest at 0 and 1
@@ -133,7 +136,11 @@ class Picture:
 
     def snapshot(self, snapshot: Snapshot, first_trial: int | None = None) -> None:
         """Draw how the learner parts the space in an episode, from the episode's first trial on."""
-        first = self._last_trial + 1 if first_trial is None else first_trial
+        if first_trial is None:
+            before = self._last_of.get(snapshot.episode - 1)
+            first = self._last_trial + 1 if before is None else before + 1
+        else:
+            first = first_trial
         self._slices.draw(snapshot, first)
 
     def choose_slices(self, outcomes: Sequence[Counted]) -> None:

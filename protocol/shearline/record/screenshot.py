@@ -17,11 +17,11 @@ from pathlib import Path
 import rerun as rr
 from rerun.experimental import ViewerClient
 
-from shearline.protocol.errors import RecordError
+from shearline.protocol.errors import LinkError, RecordError
 from shearline.record.layout import layout
 from shearline.record.page import CLOCK
 from shearline.record.reader import open_run
-from shearline.record.view import APPLICATION, draw_all, numbers, shape_of
+from shearline.record.view import APPLICATION, draw_all, follow, numbers, shape_of
 from shearline.record.viewer import executable, free_port, quiet_environment
 
 #: A picture that has not changed for so many looks is complete ...
@@ -69,6 +69,31 @@ def screenshot(
         stream.disconnect()
 
 
+def live_screenshot(
+    connect: str, path: Path | str, *, after_s: float, run_dir: Path | None = None
+) -> None:
+    """Follow a running run in a viewer without a window and write what it shows.
+
+    Args:
+        connect: The learner's endpoint.
+        path: PNG file to write.
+        after_s: How long to follow, or until the run ends [s].
+        run_dir: The run's folder, if it is at hand: what it has on record is drawn first.
+
+    Raises:
+        LinkError: If no learner is alive at ``connect``.
+        RecordError: If there is no graphics driver.
+    """
+    with _quiet(), _headless() as client:
+        stream = rr.RecordingStream(APPLICATION, recording_id="screenshot")
+        stream.connect_grpc(client.url)
+        until_s = time.monotonic() + after_s
+        follow(connect, stream, closed=lambda: time.monotonic() > until_s, run_dir=run_dir)
+        stream.flush()
+        Path(path).write_bytes(_settle(client))
+        stream.disconnect()
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Take one picture as a program; return its exit code."""
     parser = argparse.ArgumentParser(prog="shearline.record.screenshot")
@@ -78,8 +103,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--tab", type=int, default=0, help="tab in front, from 0")
     parser.add_argument("--page", action="append", default=[], help="a trial to show in full")
     parser.add_argument("--at", type=float, default=0.0, help="cursor on a page [s]")
+    parser.add_argument("--live", metavar="ENDPOINT", help="follow the run that goes on there")
+    parser.add_argument("--after", type=float, default=10.0, help="follow it so long [s]")
     asked = parser.parse_args(arguments)
     try:
+        if asked.live:
+            live_screenshot(asked.live, asked.out, after_s=asked.after, run_dir=asked.run)
+            return 0
         screenshot(
             asked.run,
             asked.out,
@@ -88,7 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             pages=asked.page,
             at_s=asked.at,
         )
-    except RecordError as error:
+    except (LinkError, RecordError) as error:
         print(error, file=sys.stderr)  # noqa: T201 - a program's one sentence
         return 4
     return 0

@@ -151,9 +151,8 @@ def _draw_outcomes(picture: Picture, run: Run) -> None:
     """Draw what is there without any trace, and have it shown at once."""
     for outcome in run.outcomes:
         picture.outcome(outcome)
-    last_trial = {outcome.episode: outcome.trial for outcome in run.outcomes}
     for episode in run.episodes:
-        picture.episode(episode, last_trial.get(episode.episode))
+        picture.episode(episode)
     for state in run.evaluators:
         picture.evaluator(state)
     _draw_partition(picture, run)
@@ -240,7 +239,7 @@ class _Live:
         self._config = so_far.config if so_far else None
         self._scene = so_far.scene if so_far else None
         self._laid_out = bool(so_far and so_far.traced())
-        self._stream.send_blueprint(layout(shape_of(so_far) if so_far else Shape()))
+        self._stream.send_blueprint(layout(shape_of(so_far) if so_far else Shape(), live=True))
         self._picture = draw(stream, so_far) if so_far else Picture(stream, None)
 
     def take(self, payload: bytes) -> None:
@@ -277,7 +276,9 @@ class _Live:
         trace = to_trace(message)
         if not self._laid_out:
             self._laid_out = True
-            self._stream.send_blueprint(layout(shape_for(self._config, trace, self._scene)))
+            slices = SLICES if self._config else 0
+            shape = shape_for(self._config, trace, self._scene, slices=slices)
+            self._stream.send_blueprint(layout(shape, live=True))
         self._picture.trace(trace)
 
 
