@@ -103,9 +103,12 @@ def test_who_sends_faster_than_is_taken_is_slowed_down_and_nothing_is_lost(
     intake: Intake, client: Link
 ) -> None:
     many = 20 * link_module.INTAKE_MAX
-    sender = threading.Thread(
-        target=lambda: [client.publish(RESULT, b"%d" % number) for number in range(many)]
-    )
+
+    def send() -> None:
+        for number in range(many):
+            client.publish(RESULT, b"%d" % number)
+
+    sender = threading.Thread(target=send)
     sender.start()
     for number in range(many):
         assert intake.take() == Arrival(RESULT, b"%d" % number)

@@ -51,7 +51,7 @@ class Intake:
         self._subscriber = subscriber
         self._waker = waker
         self._wakes_on = str(waker.key_expr)
-        self._own: deque[Any] = deque()
+        self._own: deque[object] = deque()
         self._is_woken = False
         self._taker = 0
 
