@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Sequence
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -35,8 +34,6 @@ _TRANSLATION, _ROTATION = b"\x22", b"\x2a"
 _SECONDS, _NANOS = b"\x08", b"\x10"
 #: A varint of five groups of seven bits holds any second until the year 3058, and any nanosecond.
 _VARINT = 5
-
-_Places: TypeAlias = npt.NDArray[np.int64]
 
 
 def motion(
@@ -124,33 +121,43 @@ def _filled(
     n = len(at_ns)
     if not names:
         return np.zeros((n, 0), dtype=np.uint8)
-    layout, seconds, nanos, doubles = _layouts(names)
+    layout, seconds, nanos, record = _layouts(names)
     table = np.tile(layout, (n, 1))
-    table[:, seconds] = np.tile(_varints(at_ns // 10**9), len(names))
-    table[:, nanos] = np.tile(_varints(at_ns % 10**9), len(names))
-    table[:, doubles] = np.concatenate(numbers, axis=1).astype("<f8").view(np.uint8)
+    said = _varints(at_ns // 10**9), _varints(at_ns % 10**9)
+    for offsets, varints in zip((seconds, nanos), said, strict=True):
+        for offset in offsets:
+            table[:, offset : offset + _VARINT] = varints
+    # seen as records with a number at each place, whole numbers are written and not their bytes
+    rows = table.view(record)[:, 0]
+    for name, column in zip(record.names or (), np.concatenate(numbers, axis=1).T, strict=True):
+        rows[name] = column
     return table
 
 
 @functools.lru_cache(maxsize=64)
 def _layouts(
     names: tuple[tuple[str, str], ...],
-) -> tuple[npt.NDArray[np.uint8], _Places, _Places, _Places]:
+) -> tuple[npt.NDArray[np.uint8], list[int], list[int], np.dtype[np.void]]:
     """Return the bytes of all bodies' transforms, blank, and where seconds and so on stand."""
     whole = b""
-    starts: tuple[list[int], list[int], list[int]] = ([], [], [])
+    seconds: list[int] = []
+    nanos: list[int] = []
+    doubles: list[int] = []
     for parent, child in names:
-        layout, seconds, nanos, doubles = _layout(parent, child)
-        starts[0].append(len(whole) + seconds)
-        starts[1].append(len(whole) + nanos)
-        starts[2].extend(len(whole) + offset for offset in doubles)
+        layout, second, nano, numbers = _layout(parent, child)
+        seconds.append(len(whole) + second)
+        nanos.append(len(whole) + nano)
+        doubles += [len(whole) + offset for offset in numbers]
         whole += layout
-    widths = (_VARINT, _VARINT, 8)
-    places = [
-        (np.array(found)[:, None] + np.arange(width)).ravel()
-        for found, width in zip(starts, widths, strict=True)
-    ]
-    return np.frombuffer(whole, dtype=np.uint8), places[0], places[1], places[2]
+    record = np.dtype(
+        {
+            "names": [f"f{i}" for i in range(len(doubles))],
+            "formats": ["<f8"] * len(doubles),
+            "offsets": doubles,
+            "itemsize": len(whole),
+        }
+    )
+    return np.frombuffer(whole, dtype=np.uint8), seconds, nanos, record
 
 
 def _layout(parent: str, child: str) -> tuple[bytes, int, int, tuple[int, ...]]:
