@@ -22,7 +22,8 @@ class RankedConfig:
         widening: Most by which that factor grows while the elite is not reliable.
         draws: Proposals that are ranked for each trial; 1 ranks nothing.
         reliability: Whether the ranking knows the chance of success; for comparison.
-        cost: Whether it knows a model of cost, or each success's own cost; for comparison.
+        cost: Whether the elite is chosen by the model of cost, or by each success's own cost; for
+            comparison.
         window: Trials that the reliability looks at.
         cost_window: Successes that the cost looks at.
     """
