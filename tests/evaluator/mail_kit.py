@@ -21,11 +21,11 @@ from shearline.protocol.messages import (
     Message,
     OutcomeKind,
     Result,
-    TaskSpec,
     Trial,
     Verdict,
     Welcome,
 )
+from shearline.protocol.task import TaskSpec
 
 M = TypeVar("M", bound=Message)
 I = TypeVar("I", bound=Instruction)  # noqa: E741 - beside M

@@ -15,7 +15,8 @@ from shearline.evaluator.builtin import BowlTask, builtin_names, builtin_spec, b
 from shearline.evaluator.local import run_trial
 from shearline.evaluator.tasks import FunctionTask, load_task, outcome_of, task
 from shearline.protocol.errors import ConfigError, SpaceError
-from shearline.protocol.messages import OutcomeKind, digest
+from shearline.protocol.messages import OutcomeKind
+from shearline.protocol.task import digest
 
 SPACE = {"x": ("m", -5.0, 5.0), "y": ("m", -5.0, 5.0)}
 

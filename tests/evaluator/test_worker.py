@@ -14,16 +14,8 @@ from shearline.evaluator.tasks import FunctionTask
 from shearline.evaluator.tasks import task as declare
 from shearline.protocol.codec import decode
 from shearline.protocol.keys import Address, parse
-from shearline.protocol.messages import (
-    Bye,
-    Credit,
-    OutcomeKind,
-    Renew,
-    Result,
-    TraceData,
-    Verdict,
-    digest,
-)
+from shearline.protocol.messages import Bye, Credit, OutcomeKind, Renew, Result, TraceData, Verdict
+from shearline.protocol.task import digest
 
 
 def test_a_worker_runs_a_trial_and_ends_with_the_run(learner: TinyLearner) -> None:

@@ -21,8 +21,8 @@ from shearline.protocol.messages import (
     Refused,
     Renew,
     Result,
-    TaskSpec,
 )
+from shearline.protocol.task import TaskSpec
 
 
 def test_a_worker_without_a_task_takes_the_learners(learner: TinyLearner) -> None:

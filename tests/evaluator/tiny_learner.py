@@ -24,11 +24,11 @@ from shearline.protocol.messages import (
     Hello,
     Message,
     Result,
-    TaskSpec,
     Trial,
     Verdict,
     Welcome,
 )
+from shearline.protocol.task import TaskSpec
 
 M = TypeVar("M", bound=Message)
 WAIT_S = 5.0

@@ -37,12 +37,12 @@ from shearline.protocol.messages import (
     Message,
     OutcomeKind,
     Result,
-    TaskSpec,
     TraceData,
     Trial,
     Verdict,
     Welcome,
 )
+from shearline.protocol.task import TaskSpec
 
 KINDS = (*TO_LEARNER, *TO_EVALUATOR, *TO_OBSERVER)
 TRIAL = Trial(

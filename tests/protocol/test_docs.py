@@ -24,11 +24,11 @@ from shearline.protocol.messages import (
     Message,
     OutcomeKind,
     Result,
-    TaskSpec,
     Trial,
     Verdict,
     Welcome,
 )
+from shearline.protocol.task import TaskSpec
 
 PAGE = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
 TASK = TaskSpec(name="bowl", space={"x": ("m", -5.0, 5.0), "y": ("m", -5.0, 5.0)})

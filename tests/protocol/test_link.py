@@ -15,11 +15,12 @@ import pytest
 
 from shearline.protocol import link as link_module
 from shearline.protocol.codec import BULK_BYTES_MAX, CONTROL_BYTES_MAX
+from shearline.protocol.discovery import discover
 from shearline.protocol.endpoints import check_endpoint, free_endpoint
 from shearline.protocol.errors import LinkError
 from shearline.protocol.intake import Arrival, Presence
 from shearline.protocol.keys import ANY_LEARNER, Keys
-from shearline.protocol.link import Link, discover, open_client, open_router
+from shearline.protocol.link import Link, open_client, open_router
 
 zenoh = pytest.importorskip("zenoh")
 
@@ -155,19 +156,7 @@ def test_what_is_larger_than_any_control_message_reaches_no_learner(
     assert heard == [CONTROL_BYTES_MAX, len(b"last")]
 
 
-def test_a_learner_is_discovered_once_it_announces_itself(router: Link, client: Link) -> None:
-    with pytest.raises(LinkError, match=r"no learner is alive there within 0.05 s"):
-        discover(client, 0.05)
-    router.announce(KEYS.live_learner(7))
-    assert discover(client, WAIT_S) == ("run-1", 7)
-    router.announce(KEYS.live_learner(8))
-    while discover(client, WAIT_S) != ("run-1", 8):
-        pass
-
-
-def test_waiting_for_a_learner_can_be_called_off(client: Link) -> None:
-    with pytest.raises(LinkError, match="stopped waiting"):
-        discover(client, None, cancelled=lambda: True)
+def test_waiting_to_be_connected_can_be_called_off() -> None:
     with pytest.raises(LinkError, match="stopped waiting"):
         open_client(free_endpoint(), None, cancelled=lambda: True)
 

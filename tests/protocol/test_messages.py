@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from shearline.protocol.codec import decode, encode
-from shearline.protocol.messages import TEXT_CHARS_MAX, Bye, TaskSpec, TraceData, clip, digest
+from shearline.protocol.messages import TEXT_CHARS_MAX, Bye, TraceData, clip
+from shearline.protocol.task import TaskSpec, digest
 
 SPEC = TaskSpec(
     name="keylock", space={"push": ("N", 0.0, 20.0)}, options={"level": "easy"}, trial_s=20.0

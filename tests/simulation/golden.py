@@ -26,7 +26,8 @@ from shearline.protocol.codec import encode
 from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.keys import Keys
 from shearline.protocol.link import open_client
-from shearline.protocol.messages import Command, CommandKind, OutcomeKind, TaskSpec, Trial
+from shearline.protocol.messages import Command, CommandKind, OutcomeKind, Trial
+from shearline.protocol.task import TaskSpec
 
 TASK = TaskSpec(name="ball", space={"x": ("m", -1.0, 1.0), "y": ("m", -1.0, 1.0)}, trial_s=5.0)
 CONFIG = RunConfig(task=TASK, learner="lhs", episodes=3, trials=4, seed=1, record=False)

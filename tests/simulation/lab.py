@@ -38,10 +38,10 @@ from shearline.protocol.messages import (
     OutcomeKind,
     Renew,
     Result,
-    TaskSpec,
     Trial,
     Verdict,
 )
+from shearline.protocol.task import TaskSpec
 
 LEASE_S = 2.0
 TASK = TaskSpec(name="bench", space={"x": ("", 0.0, 1.0)}, trial_s=8.0)

@@ -8,10 +8,11 @@ from collections.abc import Callable
 from queue import Empty, SimpleQueue
 
 from shearline.protocol.codec import TO_EVALUATOR, decode, encode
+from shearline.protocol.discovery import discover
 from shearline.protocol.errors import ProtocolError
 from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import discover, open_client
+from shearline.protocol.link import open_client
 from shearline.protocol.messages import (
     VERSION,
     Ack,

@@ -62,10 +62,10 @@ from shearline.protocol.messages import (
     OutcomeKind,
     Renew,
     Result,
-    TaskSpec,
     Trial,
     Verdict,
 )
+from shearline.protocol.task import TaskSpec
 
 #: Steps after which what was not renewed has lapsed.
 SILENCE_STEPS = 5

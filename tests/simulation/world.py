@@ -34,7 +34,8 @@ from shearline.learner.dispatcher.instructions import (
     Journal,
     Send,
 )
-from shearline.protocol.messages import Ack, CommandKind, Message, TaskSpec, Trial
+from shearline.protocol.messages import Ack, CommandKind, Message, Trial
+from shearline.protocol.task import TaskSpec
 
 FAULTS_S = 12.0
 #: Far beyond what any run needs once faults stop: a minute of rest, and sixty trials of half a

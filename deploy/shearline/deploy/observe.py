@@ -8,10 +8,11 @@ from queue import Empty, SimpleQueue
 from typing import Self
 
 from shearline.protocol.codec import TO_OBSERVER, decode, encode
+from shearline.protocol.discovery import discover
 from shearline.protocol.errors import LinkError, ProtocolError
 from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys, parse
-from shearline.protocol.link import Link, discover, open_client
+from shearline.protocol.link import Link, open_client
 from shearline.protocol.messages import Command, CommandKind, Message, Status
 
 #: A living learner says its status twice a second; this is several of those.

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shearline.protocol.errors import ShearlineError
-from shearline.protocol.messages import TaskSpec
 from shearline.protocol.pose import Placed
+from shearline.protocol.task import TaskSpec
 
 Array = npt.NDArray[np.float64]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from shearline.evaluator.base import Array, Outcome, Task
 from shearline.protocol.errors import ConfigError
-from shearline.protocol.messages import TaskSpec
+from shearline.protocol.task import TaskSpec
 
 #: Longest stretch that the sleeping task sleeps without a beat [s].
 _NAP_S = 0.05

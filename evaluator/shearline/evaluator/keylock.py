@@ -21,9 +21,9 @@ from shearline.evaluator.keylock_spec import (
     level,
 )
 from shearline.evaluator.skill.parameters import parameters
-from shearline.protocol.messages import TaskSpec
 from shearline.protocol.pose import Placed
 from shearline.protocol.scene import SceneData
+from shearline.protocol.task import TaskSpec
 
 if TYPE_CHECKING:
     from shearline.evaluator.skill.execute import Job

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from shearline.evaluator.skill.parameters import BOUNDS
 from shearline.protocol.errors import ConfigError
-from shearline.protocol.messages import TaskSpec
+from shearline.protocol.task import TaskSpec
 
 #: Raised whenever the skill, the cost or the scene changes what a tuple costs.
 SKILL_VERSION = 1

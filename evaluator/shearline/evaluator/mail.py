@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import msgspec
 
-from shearline.protocol.messages import Message, Result, TaskSpec, Trial
+from shearline.protocol.messages import Message, Result, Trial
+from shearline.protocol.task import TaskSpec
 
 # -- events --------------------------------------------------------------------------------------
 

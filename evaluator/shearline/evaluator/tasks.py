@@ -26,8 +26,8 @@ import numpy as np
 from shearline.evaluator.base import Array, Outcome, Task, TrialAborted
 from shearline.evaluator.builtin import builtin_names, builtin_task
 from shearline.protocol.errors import ConfigError
-from shearline.protocol.messages import TaskSpec
 from shearline.protocol.space import Space
+from shearline.protocol.task import TaskSpec
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -27,21 +27,14 @@ from shearline.evaluator.mailbox import RENEW_LEASES, Mailbox
 from shearline.evaluator.postman import End, Exchange, Postman
 from shearline.evaluator.showing import TRACE_HZ, Showing
 from shearline.evaluator.tasks import FunctionTask
+from shearline.protocol.discovery import discover
 from shearline.protocol.errors import ConfigError, LinkError
 from shearline.protocol.keys import Keys, check_name
-from shearline.protocol.link import discover, open_client
-from shearline.protocol.messages import (
-    VERSION,
-    Hello,
-    OutcomeKind,
-    Result,
-    TaskSpec,
-    Trial,
-    clip,
-    digest,
-)
+from shearline.protocol.link import open_client
+from shearline.protocol.messages import VERSION, Hello, OutcomeKind, Result, Trial, clip
 from shearline.protocol.space import Space
 from shearline.protocol.switching import quick_switching
+from shearline.protocol.task import TaskSpec, digest
 
 log = logging.getLogger(__name__)
 

@@ -10,7 +10,8 @@ from shearline.deploy.studies.task import NAME, encode, problem, repeat_of
 from shearline.evaluator import load_task
 from shearline.evaluator.local import run_trial
 from shearline.learner.registry import LEARNERS
-from shearline.protocol.messages import OutcomeKind, digest
+from shearline.protocol.messages import OutcomeKind
+from shearline.protocol.task import digest
 from shearline.sims.functions import optimum
 from shearline.studies.benchmark import run_learner
 from shearline.studies.provenance import code_of, versions

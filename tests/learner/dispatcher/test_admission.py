@@ -15,8 +15,8 @@ from shearline.protocol.messages import (
     Refused,
     Trial,
     Welcome,
-    digest,
 )
+from shearline.protocol.task import digest
 
 
 def test_a_welcome_says_the_rules_of_the_run() -> None:

@@ -25,8 +25,8 @@ from shearline.protocol.messages import (
     OutcomeKind,
     Proposed,
     Purpose,
-    TaskSpec,
 )
+from shearline.protocol.task import TaskSpec
 
 TASK = TaskSpec(name="bench", space={"x": ("", 0.0, 1.0)})
 

@@ -34,7 +34,8 @@ from shearline.learner.run.config import RunConfig
 from shearline.learner.run.fitter import Fitter, Modelled, Recommended
 from shearline.learner.run.folder import JOURNAL, Folder
 from shearline.learner.run.journal import MAGIC
-from shearline.protocol.messages import VERSION, Hello, OutcomeKind, Result, TaskSpec, Trial
+from shearline.protocol.messages import VERSION, Hello, OutcomeKind, Result, Trial
+from shearline.protocol.task import TaskSpec
 
 TASK = TaskSpec(name="ball", space={"x": ("m", -1.0, 1.0), "y": ("m", -1.0, 1.0)}, trial_s=5.0)
 #: psp takes seconds to be imported and told; lhs shows the same of everything but the learner.

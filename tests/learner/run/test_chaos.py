@@ -23,7 +23,7 @@ import os, sys
 from pathlib import Path
 from shearline.learner.run.config import RunConfig
 from shearline.learner.run.serving import serve
-from shearline.protocol.messages import TaskSpec
+from shearline.protocol.task import TaskSpec
 
 task = TaskSpec(name="t", space={"x": ("", -1.0, 1.0)})
 config = RunConfig(task=task, learner="random", episodes=3, trials=60, record=False)
@@ -35,7 +35,7 @@ EVALUATOR = """
 import os, sys, time
 from shearline.evaluator.base import Outcome
 from shearline.evaluator.worker import WorkerConfig, run_worker
-from shearline.protocol.messages import TaskSpec
+from shearline.protocol.task import TaskSpec
 
 class Slow:
     spec = TaskSpec(name="t", space={"x": ("", -1.0, 1.0)})

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shearline.learner.run.config import RunConfig, difference, from_toml, to_toml
 from shearline.learner.run.seeds import trial_seed
 from shearline.protocol.errors import ConfigError, SpaceError
-from shearline.protocol.messages import TaskSpec, digest
+from shearline.protocol.task import TaskSpec, digest
 
 TASK = TaskSpec(
     name="keylock",

@@ -23,11 +23,12 @@ from shearline.learner.run.journal import read
 from shearline.learner.run.serving import serve
 from shearline.learner.run.summary import RunSummary
 from shearline.protocol.codec import TO_OBSERVER, decode, encode
+from shearline.protocol.discovery import discover
 from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import ConfigError, LinkError, RecordError, ShearlineError
 from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import discover, open_client, open_router
+from shearline.protocol.link import open_client, open_router
 from shearline.protocol.messages import (
     Command,
     CommandKind,
@@ -38,10 +39,10 @@ from shearline.protocol.messages import (
     Proposed,
     Snapshot,
     Status,
-    TaskSpec,
     Trial,
     Wire,
 )
+from shearline.protocol.task import TaskSpec
 
 TASK = TaskSpec(name="ball", space={"x": ("m", -1.0, 1.0), "y": ("m", -1.0, 1.0)}, trial_s=5.0)
 CONFIG = RunConfig(task=TASK, learner="lhs", episodes=3, trials=5, record=False)

@@ -16,7 +16,8 @@ from shearline.evaluator.replay import Case
 from shearline.evaluator.tasks import load_task
 from shearline.protocol.codec import decode
 from shearline.protocol.errors import ConfigError, ProtocolError, RecordError
-from shearline.protocol.messages import Counted, Result, TaskSpec, Wire
+from shearline.protocol.messages import Counted, Result, Wire
+from shearline.protocol.task import TaskSpec
 from shearline.record.reader import Run
 
 #: What an evaluator says it is when its trials happen in the world.

@@ -17,7 +17,8 @@ from shearline.learner.run.config import from_toml
 from shearline.learner.run.folder import JOURNAL
 from shearline.learner.run.journal import read
 from shearline.protocol.endpoints import check_endpoint, free_endpoint
-from shearline.protocol.messages import OutcomeKind, TaskSpec, Verdict
+from shearline.protocol.messages import OutcomeKind, Verdict
+from shearline.protocol.task import TaskSpec
 from shearline.studies.repeat import Job, Repeat
 
 #: The folder of a study's runs, in the study's own.

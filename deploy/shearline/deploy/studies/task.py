@@ -12,7 +12,7 @@ import numpy as np
 
 from shearline.evaluator import task
 from shearline.learner.registry import LEARNERS
-from shearline.protocol.messages import TaskSpec
+from shearline.protocol.task import TaskSpec
 from shearline.sims.functions import Problem, centred, rastrigin, shifted, sphere
 from shearline.studies.benchmark import run_learner
 from shearline.studies.provenance import code_of, versions

@@ -26,7 +26,8 @@ from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.intake import Arrival
 from shearline.protocol.keys import Keys, parse
 from shearline.protocol.link import LIGHT, Link, open_client, open_router
-from shearline.protocol.messages import VERSION, Hello, Result, Trial, digest
+from shearline.protocol.messages import VERSION, Hello, Result, Trial
+from shearline.protocol.task import digest
 
 #: How often the timers of light evaluators are looked at [s]; they are set in quarters of seconds.
 LOOK_S = 0.1

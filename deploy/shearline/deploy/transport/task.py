@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 
 from shearline.evaluator.base import Array, Outcome
-from shearline.protocol.messages import TaskSpec
 from shearline.protocol.space import Space
+from shearline.protocol.task import TaskSpec
 
 #: The key-in-lock has 23 parameters: messages are as large as its are.
 PARAMETERS = 23

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import msgspec
 
 from shearline.evaluator.base import Trace
-from shearline.protocol.messages import Counted, OutcomeKind, Proposed, TaskSpec
+from shearline.protocol.messages import Counted, OutcomeKind, Proposed
+from shearline.protocol.task import TaskSpec
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,8 @@ from shearline.evaluator.replay.again import Replayed, again
 from shearline.evaluator.replay.case import Case
 from shearline.evaluator.replay.compare import compare
 from shearline.protocol.errors import ConfigError
-from shearline.protocol.messages import Counted, OutcomeKind, TaskSpec, digest
+from shearline.protocol.messages import Counted, OutcomeKind
+from shearline.protocol.task import TaskSpec, digest
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,8 @@ from shearline.learner.dispatcher.observed import messages
 from shearline.learner.dispatcher.roster import Evaluator, Roster
 from shearline.learner.dispatcher.rules import REJOIN_LEASES, TURNAROUNDS_MAX, Rules
 from shearline.learner.dispatcher.states import RUN, RunCause, RunState, advance
-from shearline.protocol.messages import EvaluatorState, Message, Trial, digest
+from shearline.protocol.messages import EvaluatorState, Message, Trial
+from shearline.protocol.task import digest
 
 #: Trials of one evaluator that observers are told; most hold two.
 TRIALS_SHOWN = 16

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shearline.protocol.messages import Purpose, TaskSpec
+from shearline.protocol.messages import Purpose
+from shearline.protocol.task import TaskSpec
 
 #: Evaluators known at once; more are refused, so that no table grows without bound.
 EVALUATORS_MAX = 4096

@@ -17,8 +17,8 @@ from msgspec import Meta
 
 from shearline.learner.dispatcher.rules import Rules
 from shearline.protocol.errors import ConfigError
-from shearline.protocol.messages import TaskSpec, digest
 from shearline.protocol.space import Space
+from shearline.protocol.task import TaskSpec, digest
 
 #: Proposals of one episode travel in one journal entry and fit into memory many times over.
 TRIALS_MAX = 100_000

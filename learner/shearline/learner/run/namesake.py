@@ -10,10 +10,11 @@ from __future__ import annotations
 import time
 from queue import SimpleQueue
 
+from shearline.protocol.discovery import note_learners
 from shearline.protocol.errors import ConfigError
 from shearline.protocol.intake import Presence
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import LEASE_MS, Link, note_learners
+from shearline.protocol.link import LEASE_MS, Link
 
 #: How long a router may take to answer the call; it may also come later than the learner [s].
 CONNECT_S = 0.5
