@@ -13,7 +13,7 @@ from shearline.protocol.task import TaskSpec
 PARAMETERS = 23
 
 #: A sleep may overshoot by a scheduler's tick; the rest of a wait is spun [s].
-_SPIN_S = 0.0007
+_SPIN_S = 0.0002
 
 
 class WaitTask:
