@@ -22,6 +22,7 @@ from shearline.protocol.keys import Keys
 from shearline.protocol.link import open_router
 from shearline.protocol.messages import Message, TraceData
 from shearline.record import viewer
+from shearline.record.drain import STUCK, Drain
 from shearline.record.head import config_of
 from shearline.record.picture import Picture
 from shearline.record.reader import Trace, to_trace
@@ -106,6 +107,11 @@ def test_a_run_without_traces_or_names_can_be_viewed(tmp_path: Path, messages: M
 def test_an_empty_run_can_be_viewed(tmp_path: Path) -> None:
     save(tmp_path, tmp_path / "empty.rrd")
     assert (tmp_path / "empty.rrd").is_file()
+
+
+def test_a_full_disk_is_one_clear_error(write_run: Callable[..., Path]) -> None:
+    with pytest.raises(RecordError, match=r"cannot be written to /dev/full: .*No space left"):
+        save(write_run(), "/dev/full")
 
 
 def test_without_a_screen_the_way_out_is_said(
@@ -223,31 +229,13 @@ def test_a_trial_that_is_not_there_is_one_clear_error(
         save(write_run(), tmp_path / "run.rrd", trials=("99",))
 
 
-@contextmanager
-def a_viewer() -> Iterator[tuple[subprocess.Popen[bytes], int]]:
-    """A viewer without its window: what takes a stream and keeps it."""
-    port = viewer.free_port()
-    with viewer.quiet_environment() as environment:
-        child = subprocess.Popen(
-            [viewer.executable(), "--serve-grpc", "--bind", "127.0.0.1", "--port", str(port)],
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,  # the command starts the viewer proper as a child of its own
-        )
-        try:
-            yield child, port
-        finally:
-            os.killpg(child.pid, signal.SIGKILL)
-            child.wait()
-
-
-def draw_for(picture: Picture, trace: Trace, times: int) -> float:
-    """Draw one trace again and again; return how much memory that took for good [MB]."""
+def draw_for(picture: Picture, drain: Drain, trace: Trace, times: int) -> float:
+    """Draw one trace again and again, as a live view does; return what that took for good [MB]."""
     before = resident_mb()
     for _ in range(times):
-        picture.trace(trace)
-        picture.flush()
+        if drain.taken():
+            picture.trace(trace)
+            picture.flush()
     return resident_mb() - before
 
 
@@ -256,14 +244,80 @@ def resident_mb() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+def first_trace(messages: Messages) -> Trace:
+    return to_trace(next(m for m in messages(hz=1000) if isinstance(m, TraceData)))
+
+
+@contextmanager
+def a_viewer() -> Iterator[tuple[subprocess.Popen[bytes], int]]:
+    """A viewer without its window: what takes a stream and keeps it."""
+    port = viewer.free_port()
+    with viewer.started(["--serve-grpc"], port) as child:
+        yield child, port
+
+
 @pytest.mark.slow
 @pytest.mark.chaos
 def test_a_viewer_that_is_killed_blocks_nobody_and_fills_no_memory(messages: Messages) -> None:
-    said = next(message for message in messages(hz=1000) if isinstance(message, TraceData))
-    trace, drawn = to_trace(said), 500
+    trace, drawn = first_trace(messages), 100
     with a_viewer() as (child, port):
-        picture = Picture(connected(port), None)
-        draw_for(picture, trace, 20)
+        stream = connected(port)
+        picture, drain = Picture(stream, None), Drain(stream, patience_s=0.2)
+        draw_for(picture, drain, trace, 20)
         os.killpg(child.pid, signal.SIGKILL)
-        grown_mb = draw_for(picture, trace, drawn)  # it comes back: nobody waited for the viewer
+        grown_mb = draw_for(picture, drain, trace, drawn)  # it comes back: nobody waited
     assert grown_mb < 0.5 * drawn * BYTES_DRAWN / 1e6
+
+
+@pytest.mark.slow
+@pytest.mark.chaos
+def test_a_viewer_that_is_stopped_fills_no_memory_and_gets_the_rest_once_it_goes_on(
+    messages: Messages, capfd: pytest.CaptureFixture[str]
+) -> None:
+    trace = first_trace(messages)
+    with a_viewer() as (child, port):
+        stream = connected(port)
+        picture, drain = Picture(stream, None), Drain(stream, patience_s=0.2)
+        draw_for(picture, drain, trace, 20)
+        assert drain.taken()
+        os.killpg(child.pid, signal.SIGSTOP)
+        # what is on its way fills some buffers; then further tries take no more
+        draw_for(picture, drain, trace, 30)
+        assert not drain.taken()
+        fed_mb = draw_for(picture, drain, trace, 40)
+        assert fed_mb < 0.2 * 40 * BYTES_DRAWN / 1e6
+        os.killpg(child.pid, signal.SIGCONT)
+        assert drain.wait(lambda: child.poll() is not None)
+    assert capfd.readouterr().err.count(STUCK) == 1
+
+
+@pytest.mark.slow
+def test_with_its_command_the_viewer_itself_is_ended_even_if_it_is_stopped() -> None:
+    with a_viewer() as (child, _):
+        (proper,) = children(child.pid)
+        os.kill(proper, signal.SIGSTOP)
+    assert not running(proper)
+    assert not running(child.pid)
+
+
+@pytest.mark.slow
+def test_with_its_command_killed_the_viewer_itself_is_ended() -> None:
+    with a_viewer() as (child, _):
+        (proper,) = children(child.pid)
+        child.kill()
+        child.wait()
+    assert not running(proper)
+
+
+def children(pid: int) -> list[int]:
+    text = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii")
+    return [int(word) for word in text.split()]
+
+
+def running(pid: int) -> bool:
+    """Tell whether a process is more than a name that nobody has asked after yet."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
+    except FileNotFoundError:
+        return False
+    return stat.rsplit(") ", 1)[1][0] not in "ZX"

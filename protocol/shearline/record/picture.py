@@ -20,6 +20,7 @@ from shearline.protocol.messages import (
     EpisodeClosed,
     EvaluatorState,
     OutcomeKind,
+    Purpose,
     Snapshot,
 )
 from shearline.protocol.scene import SceneData
@@ -91,14 +92,14 @@ class Picture:
         self._played = Played(self._sheet, self._space, self._points)
 
     def outcome(self, counted: Counted) -> None:
-        """Draw the outcome of one trial: its points in the plots and its card."""
+        """Draw the outcome of one trial: its card, and its points if it was there to learn from."""
         self._outcomes[counted.trial] = counted.kind
         self._last_trial = max(self._last_trial, counted.trial)
         last = self._last_of.get(counted.episode, counted.trial)
         self._last_of[counted.episode] = max(last, counted.trial)
         at = {**self._at(counted.trial), "clock": counted.at_s}
         self._sheet.row("card", at, rr.TextDocument, text=[card(counted, self._config)])
-        if counted.kind is None:
+        if counted.kind is None or counted.purpose is not Purpose.LEARNING:
             return
         kind = counted.kind.value
         self._scalar(f"cost/{kind}", at, counted.cost)
@@ -111,7 +112,13 @@ class Picture:
         found.append([*at.values(), *counted.theta])
 
     def episode(self, closed: EpisodeClosed) -> None:
-        """Draw what an episode came to, at its last trial, with one standard error."""
+        """Draw what an episode came to, at its last trial, with one standard error.
+
+        Only learning is drawn: a recommendation that is tried again and again, or its region drawn
+        from, would look like a leap of it.
+        """
+        if closed.purpose is not Purpose.LEARNING:
+            return
         last = self._last_of.get(closed.episode, self._last_trial)
         self._sheet.stream.set_time("trial", sequence=last)
         self._sheet.stream.set_time("clock", timestamp=closed.at_s)
@@ -145,7 +152,11 @@ class Picture:
 
     def choose_slices(self, outcomes: Sequence[Counted]) -> None:
         """Choose the parameters of the slices by everything that is known of the run."""
-        known = [outcome for outcome in outcomes if outcome.kind is not None]
+        known = [
+            outcome
+            for outcome in outcomes
+            if outcome.kind is not None and outcome.purpose is Purpose.LEARNING
+        ]
         if self._config is None or not self._config.names or not known:
             return
         low, high = np.array(self._config.low), np.array(self._config.high)

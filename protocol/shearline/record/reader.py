@@ -241,8 +241,7 @@ class _Found:
 def _hold(run: Run, found: _Found) -> None:
     match found.message:
         case RunConfig() as config:
-            if config.names or run.config is None or not run.config.names:
-                run.config = config
+            run.config = _better(run.config, config)
         case Proposed() as proposed:
             run.proposed.setdefault(proposed.trial, proposed)
         case Counted() as outcome:
@@ -260,6 +259,11 @@ def _hold(run: Run, found: _Found) -> None:
         case TraceData() as trace:
             run.phases[trace.trial] = phases_of(trace)
             run._traced.setdefault(trace.trial, []).append(found.place)  # noqa: SLF001 - its builder
+
+
+def _better(known: RunConfig | None, found: RunConfig) -> RunConfig:
+    """Return the newer head, unless only the older one names parameters."""
+    return known if known and known.names and not found.names else found
 
 
 def _scan(path: Path, topics: frozenset[str], damage: list[str]) -> Iterator[_Found]:

@@ -13,9 +13,10 @@ from pathlib import Path
 import rerun as rr
 
 from shearline.protocol import codec
-from shearline.protocol.errors import ProtocolError
+from shearline.protocol.discovery import discover
+from shearline.protocol.errors import ProtocolError, RecordError
 from shearline.protocol.keys import Keys
-from shearline.protocol.link import discover, open_client
+from shearline.protocol.link import open_client
 from shearline.protocol.messages import (
     Counted,
     EpisodeClosed,
@@ -28,6 +29,7 @@ from shearline.protocol.messages import (
 from shearline.protocol.scene import SceneData
 from shearline.record import columns
 from shearline.record.bodies import paths
+from shearline.record.drain import Drain
 from shearline.record.inbox import Inbox
 from shearline.record.layout import Shape, layout
 from shearline.record.page import ROOTS, draw_page
@@ -59,13 +61,18 @@ def save(run_dir: Path | str, path: Path | str, *, trials: Sequence[str] = ()) -
         The run that was drawn; its ``damage`` says what could not be read.
 
     Raises:
-        RecordError: If there is no such run folder or trial, or a trace cannot be read.
+        RecordError: If there is no such run folder or trial, a trace cannot be read, or the file
+            cannot be written.
     """
     run = open_run(run_dir)
     chosen = numbers(run, trials)
     stream = rr.RecordingStream(APPLICATION, recording_id=f"{run.name or run.run_dir.name}")
-    stream.save(path, default_blueprint=layout(shape_of(run, chosen)))
-    draw_all(stream, run, chosen)
+    try:
+        stream.save(path, default_blueprint=layout(shape_of(run, chosen)))
+        draw_all(stream, run, chosen)
+        stream.flush()
+    except RuntimeError as error:  # the library's word for a full disk
+        raise RecordError(f"the view cannot be written to {path}: {error}") from error
     stream.disconnect()
     return run
 
@@ -121,14 +128,16 @@ def draw_all(
     for root, trial in zip(ROOTS, trials, strict=False):
         draw_page(stream, root, outcomes[trial], run.traces(trial), run.config, run.scene)
     draw(stream, run, closed=closed)
-    if not closed():
-        stream.flush()
 
 
 def draw(
     stream: rr.RecordingStream, run: Run, *, closed: Callable[[], bool] = lambda: False
 ) -> Picture:
-    """Draw everything a run has on record; return the picture, to be drawn on."""
+    """Draw everything a run has on record; return the picture, to be drawn on.
+
+    A viewer that does not keep up is waited for, unless ``closed`` says that it is gone.
+    """
+    drain = Drain(stream)
     picture = Picture(
         stream,
         run.config,
@@ -141,9 +150,10 @@ def draw(
         picture.trace(trace)
         if drawn % FLUSH_TRACES == 0:
             picture.flush()
-            if closed():
-                break
+            if not drain.wait(closed):
+                return picture
     picture.flush()
+    drain.wait(closed)
     return picture
 
 
@@ -199,7 +209,7 @@ def follow(
         link.watch(Keys(run).live_learners(), inbox)
         inbox.wait_for_learner(timeout_s)
         so_far = open_run(run_dir) if run_dir else None
-        live, shown_s = _Live(stream, so_far), 0.0
+        drain, live, shown_s = Drain(stream), _Live(stream, so_far, closed), 0.0
         ready()
         while not closed():
             item = inbox.get(TICK_S)
@@ -207,6 +217,7 @@ def follow(
                 live.take(item.payload)
             if item is None or time.monotonic() > shown_s + TICK_S:
                 live.flush()
+                drain.wait(closed)  # meanwhile the inbox keeps what there is room for
                 shown_s = time.monotonic()
             if item is None and live.ended:
                 return
@@ -233,14 +244,16 @@ def view_live(connect: str, run_dir: Path | None = None) -> None:
 class _Live:
     """Draws messages as they come; what it cannot read it leaves out."""
 
-    def __init__(self, stream: rr.RecordingStream, so_far: Run | None) -> None:
+    def __init__(
+        self, stream: rr.RecordingStream, so_far: Run | None, closed: Callable[[], bool]
+    ) -> None:
         self.ended = False
         self._stream = stream
         self._config = so_far.config if so_far else None
         self._scene = so_far.scene if so_far else None
         self._laid_out = bool(so_far and so_far.traced())
         self._stream.send_blueprint(layout(shape_of(so_far) if so_far else Shape(), live=True))
-        self._picture = draw(stream, so_far) if so_far else Picture(stream, None)
+        self._picture = draw(stream, so_far, closed=closed) if so_far else Picture(stream, None)
 
     def take(self, payload: bytes) -> None:
         try:

@@ -8,12 +8,16 @@ reaches nothing. The user's own configuration is neither read nor changed.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
+import signal
+import socket
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +29,9 @@ from shearline.protocol.errors import RecordError
 NOWHERE = "http://127.0.0.1:9"
 #: What a viewer may take of the machine before it forgets the oldest data.
 MEMORY_LIMIT = "50%"
+#: How long a viewer may take until it listens [s]; most of it is the system reading its program.
+START_S = 30.0
+LOOK_S = 0.05
 
 
 @contextmanager
@@ -58,31 +65,67 @@ def quiet_environment() -> Iterator[dict[str, str]]:
 def viewer(arguments: Sequence[str], port: int | None = None) -> Iterator[subprocess.Popen[bytes]]:
     """Run a viewer of our own for as long as the block lasts; it is ended with it.
 
+    The block begins once it listens, or has ended: what is sent to nobody is lost.
+
     Args:
         arguments: What its command line takes, e.g. the file to open.
         port: Where it listens on this machine; ``None`` takes a free one, so that a viewer that
             is already open is left alone.
 
     Raises:
-        RecordError: If there is no viewer or no screen.
+        RecordError: If there is no viewer or no screen, or it never listens.
     """
     if not has_screen():
         raise RecordError(
             "there is no screen here: write the view to a file with --save view.rrd and open"
             " it where there is one (rerun view.rrd)"
         )
-    where = ["--bind", "127.0.0.1", "--port", str(port or free_port())]
-    command = [executable(), *arguments, *where, "--hide-welcome-screen"]
+    port = port or free_port()
+    command = [*arguments, "--hide-welcome-screen", "--memory-limit", MEMORY_LIMIT]
+    with started(command, port) as child:
+        yield child
+
+
+@contextmanager
+def started(arguments: Sequence[str], port: int) -> Iterator[subprocess.Popen[bytes]]:
+    """Run the viewer's program on a port for as long as the block lasts, window or not.
+
+    The command on the path starts the viewer proper as a child of its own. So both have a session
+    to themselves, and all of it is ended, also what has been stopped.
+
+    Raises:
+        RecordError: If there is no viewer, or it never listens.
+    """
+    where = ["--bind", "127.0.0.1", "--port", str(port)]
     with quiet_environment() as environment:
         child = subprocess.Popen(  # noqa: S603 - the viewer we depend on, our own arguments
-            [*command, "--memory-limit", MEMORY_LIMIT], env=environment
+            [executable(), *arguments, *where], env=environment, start_new_session=True
         )
         try:
+            _wait_until_listening(child, port)
             yield child
         finally:
-            if child.poll() is None:
-                child.terminate()
+            with contextlib.suppress(ProcessLookupError):  # its window was closed
+                os.killpg(child.pid, signal.SIGKILL)
             child.wait()
+
+
+def _wait_until_listening(child: subprocess.Popen[bytes], port: int) -> None:
+    until_s = time.monotonic() + START_S
+    while not _listens(port):
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            child.wait(LOOK_S)
+            return
+        if time.monotonic() > until_s:
+            raise RecordError(
+                f"the viewer did not listen within {START_S:.0f} s: write the view to a file with"
+                " --save view.rrd and open it later"
+            )
+
+
+def _listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 def check_ended_well(child: subprocess.Popen[bytes]) -> None:
