@@ -148,3 +148,24 @@ def test_a_run_that_is_not_there_is_one_sentence(
     for command in ("trials", "report"):
         assert main([command, str(tmp_path / "nowhere")]) == Exit.RUN_FAILED
         assert "expected a run folder, found nothing at" in capsys.readouterr().err
+
+
+def test_a_run_without_a_record_has_its_trials_in_the_journal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "run"
+    words = "--learner random --evaluators 1 --episodes 2 --trials 4 --no-record --json"
+    assert main(["up", "--task", "sphere", *words.split(), "--out", str(folder)]) == Exit.OK
+    capsys.readouterr()
+    assert not list(folder.glob("*.mcap"))
+    assert main(["trials", str(folder), "--json"]) == Exit.OK
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [row["trial"] for row in rows] == list(range(8))
+    assert all(name in (folder / "run.toml").read_text() for name in rows[0]["theta"])
+
+
+def test_a_folder_with_neither_record_nor_journal_is_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["trials", str(tmp_path)]) == Exit.RUN_FAILED
+    assert "found neither a record nor a journal" in capsys.readouterr().err
