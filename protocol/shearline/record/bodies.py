@@ -5,6 +5,7 @@ Pure arithmetic on columns; whether a viewer or a file takes the poses is not kn
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -58,10 +59,16 @@ def moving(scene: SceneData, columns: Mapping[str, Array]) -> list[Motion]:
 
 
 def _slid(body: Body, shift_m: Array) -> Motion:
-    along = turned(body.quaternion, body.axis)
+    along = _along(tuple(body.quaternion), tuple(body.axis))
     position = np.array(body.position) + np.outer(shift_m, along)
     quaternion = np.tile(np.array(body.quaternion, dtype=np.float32), (len(shift_m), 1))
     return Motion(body, position.astype(np.float32), quaternion)
+
+
+@functools.lru_cache(maxsize=256)
+def _along(quaternion: tuple[float, ...], axis: tuple[float, ...]) -> npt.NDArray[np.float64]:
+    """Return where a slide leads; the same in every trial, and dear as numpy goes."""
+    return turned(quaternion, axis)
 
 
 def _turned(bodies: list[Body], angle: Array) -> list[Motion]:
