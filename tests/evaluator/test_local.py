@@ -13,6 +13,7 @@ from shearline.evaluator.builtin import BowlTask
 from shearline.evaluator.local import EXTRAS_MAX, objection, run_trial, trace_data
 from shearline.protocol.codec import decode, encode
 from shearline.protocol.messages import OutcomeKind, Result, TraceData
+from shearline.protocol.pose import Placed
 from shearline.protocol.space import Space
 
 SPACE = Space({"push": ("N", 0.0, 20.0), "turn": ("rad", -1.0, 1.0)})
@@ -82,6 +83,12 @@ def test_a_trace_becomes_columns_that_do_not_change_with_the_next_trial() -> Non
     columns = np.frombuffer(message.data, "<f4").reshape(len(message.names), message.samples)
     assert columns.tolist() == [[0.0, 2.0, 4.0], [1.0, 3.0, 5.0]]
     assert len(message.events) == 256
+
+
+def test_where_a_trial_had_its_bodies_goes_with_its_trace() -> None:
+    lock = Placed(body="lock", position=[0.5, 0.0, 0.1], quaternion=[0.0, 0.0, 0.0, 1.0])
+    message = trace_data(Trace(np.zeros(1, np.float32), {}, placed=(lock,)), 0, "token-01")
+    assert decode(encode(message), TraceData).placed == [lock]
 
 
 def test_columns_of_different_lengths_are_refused() -> None:

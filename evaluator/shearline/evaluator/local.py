@@ -113,6 +113,7 @@ def trace_data(trace: Trace, trial: int, token: str) -> TraceData:
         units=[clip(unit) for unit, _ in columns.values()],
         data=data.tobytes(),
         events=[(float(t_s), clip(name)) for t_s, name in trace.events[:EVENTS_MAX]],
+        placed=list(trace.placed),
     )
 
 
