@@ -27,7 +27,7 @@ from shearline.record.head import config_of
 from shearline.record.picture import Picture
 from shearline.record.reader import Trace, to_trace
 from shearline.record.screenshot import screenshot
-from shearline.record.view import APPLICATION, connected, follow, save, view
+from shearline.record.view import APPLICATION, LIVE_BULK_BYTES, connected, follow, save, view
 from shearline.record.writer import RecordWriter
 
 Messages = Callable[..., list[Message]]
@@ -289,6 +289,40 @@ def test_a_viewer_that_is_stopped_fills_no_memory_and_gets_the_rest_once_it_goes
         os.killpg(child.pid, signal.SIGCONT)
         assert drain.wait(lambda: child.poll() is not None)
     assert capfd.readouterr().err.count(STUCK) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.chaos
+def test_a_live_view_of_a_stopped_viewer_holds_what_its_inbox_has_room_for(
+    messages: Messages,
+) -> None:
+    said, keys, ended = messages(hz=1000), Keys("synthetic"), threading.Event()
+    trace = next(message for message in said if isinstance(message, TraceData))
+    with a_viewer() as (child, port), open_router(free_endpoint()) as link:
+        link.announce(keys.live_learner(1))
+        ready = threading.Event()
+        thread = threading.Thread(
+            target=follow,
+            args=(link.endpoint, connected(port)),
+            kwargs={"closed": ended.is_set, "ready": ready.set},
+        )
+        thread.start()
+        assert ready.wait(20.0)
+        os.killpg(child.pid, signal.SIGSTOP)
+        key, payload = keys.obs(trace, "sim-0"), encode(trace)
+        before_mb, n = resident_mb(), 4 * LIVE_BULK_BYTES // len(payload)
+        for _ in range(n):
+            link.publish(key, payload)
+        grown_mb = resident_mb() - before_mb
+        os.killpg(child.pid, signal.SIGCONT)
+        link.publish(keys.obs(said[-1]), encode(said[-1]))
+        thread.join(30.0)
+        went_on = not thread.is_alive()
+        ended.set()
+        thread.join()
+    assert went_on
+    # the inbox, and what was on its way: not four inboxes full, nor what is drawn of them
+    assert grown_mb < 2.5 * LIVE_BULK_BYTES / 1e6
 
 
 @pytest.mark.slow
