@@ -90,7 +90,7 @@ def add_run(command: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--task", help="keylock, keylock-limit, keylock-jam, sphere, or file:function"
     )
-    learners = "psp (default), psp-ranked, psp-paper, hireps, cmaes, ga, pso, lhs, random"
+    learners = "psp-ranked (default), psp, psp-paper, hireps, cmaes, ga, pso, lhs, random"
     group.add_argument("--learner", help=learners)
     group.add_argument("--episodes", type=positive, metavar="K", help="updates (default 10)")
     group.add_argument("--trials", type=positive, metavar="N", help="per episode (default 20)")

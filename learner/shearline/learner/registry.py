@@ -18,9 +18,9 @@ from shearline.protocol.space import Space
 #: Name to ``module:callable``; the callable takes ``(space, episode_length, seed, **switches)``.
 LEARNERS: Mapping[str, str] = MappingProxyType(
     {
+        "psp-ranked": "shearline.learner.ranked.ranked:ranked",
         "psp": "shearline.learner.psp.psp:working",
         "psp-paper": "shearline.learner.psp.psp:literal",
-        "psp-ranked": "shearline.learner.ranked.ranked:ranked",
         "hireps": "shearline.learner.hireps:HiREPS",
         "cmaes": "shearline.learner.cmaes:CMAES",
         "ga": "shearline.learner.ga:GeneticAlgorithm",
@@ -34,7 +34,7 @@ LEARNERS: Mapping[str, str] = MappingProxyType(
 UNLISTED: Mapping[str, str] = MappingProxyType({"plan": "shearline.learner.plan:Plan"})
 
 #: Other words for them: ``best`` is the learner we would use ourselves.
-ALIASES: Mapping[str, str] = MappingProxyType({"best": "psp"})
+ALIASES: Mapping[str, str] = MappingProxyType({"best": "psp-ranked"})
 
 
 def names() -> tuple[str, ...]:

@@ -86,7 +86,7 @@ def test_a_task_is_needed_and_its_space_checked() -> None:
     ("changes", "named"),
     [
         ({"seed": 1}, "its seed is 0, not 1"),
-        ({"learner": "lhs"}, "its learner is 'psp', not 'lhs'"),
+        ({"learner": "lhs"}, "its learner is 'psp-ranked', not 'lhs'"),
         ({"trials": 3}, "its trials is 20, not 3"),
         ({"switches": {"svm_c": 1e3}}, "its learner has other switches (none)"),
         ({"task": TaskSpec(name="keylock", space={"x": ("", 0.0, 1.0)})}, "its task is 'keylock'"),

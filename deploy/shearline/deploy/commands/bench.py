@@ -27,7 +27,9 @@ def register(commands: Subparsers) -> None:
     learner = kinds.add_parser(
         "learner", help="time and memory of an update and its proposals by data size"
     )
-    learner.add_argument("--learner", default="psp", metavar="NAME", help="default psp")
+    learner.add_argument(
+        "--learner", default="psp-ranked", metavar="NAME", help="default %(default)s"
+    )
     learner.add_argument(
         "--sizes", type=at_least(LEARNER_TRIALS_MIN), nargs="+", metavar="N", help="trials told"
     )

@@ -91,7 +91,7 @@ def _register_lock(kinds: Subparsers) -> None:
         description="Runs of 10 episodes of 20 trials through the whole system, seed by seed.",
     )
     lock.add_argument("--task", choices=LEVELS, default=LEVELS[0])
-    lock.add_argument("--learner", default="psp")
+    lock.add_argument("--learner", default="psp-ranked")
     lock.add_argument("--experiments", type=positive, default=5, metavar="M")
     lock.add_argument("--first-seed", type=at_least(0), default=0, metavar="S")
     lock.add_argument("--fresh", type=positive, default=100, metavar="N", help="default 100")

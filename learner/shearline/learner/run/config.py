@@ -51,7 +51,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """
 
     task: TaskSpec
-    learner: Annotated[str, Meta(min_length=1, max_length=64)] = "psp"
+    learner: Annotated[str, Meta(min_length=1, max_length=64)] = "psp-ranked"
     switches: dict[str, Any] = {}
     episodes: Annotated[int, Meta(ge=1, le=1_000_000)] = 10
     trials: Annotated[int, Meta(ge=1, le=TRIALS_MAX)] = 20
