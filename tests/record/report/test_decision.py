@@ -5,8 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from shearline.learner import Space, create
 from shearline.learner.psp.config import Partitioner, PSPConfig
 from shearline.learner.psp.partition import fit_partition
+from shearline.learner.ranked.reliability import features
 from shearline.record.report.decision import decision_of
 
 
@@ -24,6 +26,22 @@ def test_every_kind_of_partition_is_evaluated_as_its_learner_does(kind: Partitio
     assert decision_of(model, 2) is None, "it belongs to another space"
 
 
+def test_what_is_more_likely_to_succeed_than_to_fail_is_good() -> None:
+    learner = create("psp-ranked", Space.unit(3), episode_length=20, seed=0)
+    for _ in range(3):
+        for p in learner.ask(20):
+            learner.tell(p.trial, cost=float(p.theta[1]), success=bool(p.theta[0] > 0.4))
+    learner.ask(1)
+    model = json.loads(json.dumps(learner.snapshot()))
+    decide = decision_of(model, 3)
+    assert decide is not None
+    fresh = np.random.default_rng(1).random((200, 3))
+    said = model["partition"]
+    phi = features(fresh, np.array(said["centre"]), np.array(said["scale"]))
+    np.testing.assert_allclose(decide(fresh), phi @ np.array(said["weights"]), atol=1e-9)
+    assert np.mean((decide(fresh) >= 0.0) == (fresh[:, 0] > 0.4)) > 0.8
+
+
 MACHINE = {"kind": "svm-rbf", "support": [[0.5]], "dual": [1.0], "gamma": 1.0, "intercept": 0.0}
 
 
@@ -34,9 +52,8 @@ MACHINE = {"kind": "svm-rbf", "support": [[0.5]], "dual": [1.0], "gamma": 1.0, "
         {"partition": None},
         {"partition": {"kind": "oracle"}},
         {"partition": MACHINE | {"support": []}},
-        {"partition": MACHINE, "elite": {"centre": [0.5], "covariance": [[1.0]]}},
     ],
-    ids=["nothing", "none yet", "unknown", "no supports", "in units of the elite"],
+    ids=["nothing", "none yet", "unknown", "no supports"],
 )
 def test_what_cannot_be_evaluated_is_no_partition(model: dict[str, object]) -> None:
     assert decision_of(model, 1) is None

@@ -66,12 +66,12 @@ class Model:
         return np.array(u[int(np.argmin(self.score(u)))])
 
     def snapshot(self) -> Mapping[str, object]:
-        """Return elite, samples and the reliability's weights as plain values."""
+        """Return elite, samples and the reliability, which parts the space, as plain values."""
         return {
             "elite": dict(self.elite.snapshot()),
             "price": self.price,
             "threshold": self.threshold,
-            "reliability": dict(self.reliability.snapshot()),
+            "partition": dict(self.reliability.snapshot()),
             "samples": {
                 "trial": self.trials.number.tolist(),
                 "u": self.trials.u.tolist(),

@@ -68,8 +68,12 @@ class Reliability:
         return self._deviation(features(u, self.centre, self.scale))
 
     def snapshot(self) -> Mapping[str, object]:
-        """Return the function as plain values; ``weights`` belong to :func:`features`."""
+        """Return the log-odds as plain values; ``weights`` belong to :func:`features`.
+
+        It parts the space where success and failure are equally likely.
+        """
         return {
+            "kind": "log-odds",
             "centre": self.centre.tolist(),
             "scale": self.scale.tolist(),
             "weights": self.mean.tolist(),

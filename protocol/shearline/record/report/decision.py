@@ -22,21 +22,22 @@ def decision_of(model: Mapping[str, Any], n: int) -> Decision | None:
     """Return the partition of a snapshot as a function.
 
     Args:
-        model: A snapshot; one whose learner works relative to its ``elite`` has no partition of
-            the space itself.
+        model: A snapshot.
         n: Parameters of the run.
 
     Returns:
         ``None`` where there is no partition, or none of a known kind for so many parameters.
     """
     said = model.get("partition")
-    if not isinstance(said, Mapping) or "elite" in model:
+    if not isinstance(said, Mapping):
         return None
     match said.get("kind"):
         case "svm-rbf" if _width(said["support"]) == n:
             return _machine(said)
         case "network" if len(said["hidden"]) == n:
             return _network(said)
+        case "log-odds" if len(said["centre"]) == n:
+            return _log_odds(said)
         case "trees" if max(said["feature"], default=-1) < n:
             return _trees(said)
     return None
@@ -63,6 +64,23 @@ def _network(said: Mapping[str, Any]) -> Decision:
     def decide(u: Array) -> Array:
         values: Array = np.tanh((2.0 * u - 1.0) @ hidden + hidden_offset) @ out + offset
         return values
+
+    return decide
+
+
+def _log_odds(said: Mapping[str, Any]) -> Decision:
+    """``f(u) = w_0 + w_1 mean(z^2 - 1) + sum_j (a_j z_j + b_j (z_j^2 - 1))``: above 0, it succeeds.
+
+    ``z = (u - centre) / scale``; the weights are ``w_0, w_1, a, b``.
+    """
+    centre, scale = np.array(said["centre"]), np.array(said["scale"])
+    weights = np.array(said["weights"])
+
+    def decide(u: Array) -> Array:
+        z = (u - centre) / scale
+        square = np.square(z) - 1.0
+        values: Array = np.hstack([square.mean(axis=1, keepdims=True), z, square]) @ weights[1:]
+        return values + weights[0]
 
     return decide
 
