@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from shearline.protocol.messages import Counted, EpisodeClosed, Message
-from shearline.record import complete
+from shearline.record.complete import complete
 from shearline.record.parts import parts
 from shearline.record.reader import open_run
 

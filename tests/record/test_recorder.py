@@ -22,8 +22,9 @@ from shearline.protocol.keys import Keys
 from shearline.protocol.link import Link, open_router
 from shearline.protocol.messages import Counted, Message, Proposed, Status, TraceData
 from shearline.record.reader import Run, open_run
-from shearline.record.recorder import main, record_run, spawn
+from shearline.record.recorder import main, record_run
 from shearline.record.seal import seal_all
+from shearline.record.start import spawn
 
 Messages = Callable[..., list[Message]]
 KEYS = Keys("synthetic")

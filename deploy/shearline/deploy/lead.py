@@ -11,6 +11,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,6 +25,9 @@ from shearline.learner.run.summary import RunSummary
 from shearline.protocol.endpoints import check_endpoint
 from shearline.protocol.errors import RecordError
 from shearline.protocol.messages import Counted, EpisodeClosed
+from shearline.record.start import spawn
+from shearline.record.tally import tally
+from shearline.record.topics import TOPICS
 
 #: A recorder starts within a second; a run does not wait longer than this for it [s].
 READY_S = 10.0
@@ -75,8 +79,6 @@ def lead(
 
 def _started(listen: str, run_dir: Path) -> subprocess.Popen[str]:
     """Start a recorder and return it once it is ready, or will not be."""
-    from shearline.record.recorder import spawn  # noqa: PLC0415 - loads the formats of records
-
     recorder = spawn(reach(listen), run_dir.resolve().name, run_dir)
     _wait_until_ready(recorder)
     return recorder
@@ -107,10 +109,15 @@ def _finish(recorder: subprocess.Popen[str]) -> None:
 
 def _complete(run_dir: Path) -> None:
     """Put into the record what the journal has and it has not; a full disk is not a lost run."""
-    from shearline.record.complete import complete  # noqa: PLC0415 - as above
+    journal = list(outcomes(run_dir))
+    said = Counter(TOPICS[type(message)].name for message in journal)
+    on_record = tally(run_dir)
+    if on_record is not None and all(on_record[topic] == n for topic, n in said.items()):
+        return  # nothing was dropped and nobody killed: the record need not be read for that
+    from shearline.record.complete import complete  # noqa: PLC0415 - loads the formats of records
 
     try:
-        missing = complete(run_dir, outcomes(run_dir))
+        missing = complete(run_dir, journal)
     except (RecordError, OSError) as error:
         _say(f"the record is incomplete: {error}; the journal has everything")
         return

@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -77,21 +76,6 @@ def record_run(
             inbox.wait_for_learner(HEARD_S)
             ready()
             _Recorder(inbox, writer, silence_s, stopped).work()
-
-
-def spawn(connect: str, run: str, run_dir: Path) -> subprocess.Popen[str]:
-    """Start a recorder as a child in its own session, so that Ctrl-C is not meant for it.
-
-    Its ``recording`` line arrives on the child's ``stdout``; complaints go to our ``stderr``.
-    """
-    command = [sys.executable, "-m", __spec__.name, "--connect", connect, "--run", run]
-    return subprocess.Popen(  # noqa: S603 - our own module, arguments are not interpreted
-        [*command, "--out", str(run_dir)],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
 
 
 class _Recorder:

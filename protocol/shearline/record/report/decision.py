@@ -79,8 +79,9 @@ def _log_odds(said: Mapping[str, Any]) -> Decision:
     def decide(u: Array) -> Array:
         z = (u - centre) / scale
         square = np.square(z) - 1.0
-        values: Array = np.hstack([square.mean(axis=1, keepdims=True), z, square]) @ weights[1:]
-        return values + weights[0]
+        phi = np.hstack([square.mean(axis=1, keepdims=True), z, square])
+        values: Array = phi @ weights[1:] + weights[0]
+        return values
 
     return decide
 
