@@ -22,12 +22,13 @@ def test_an_unknown_learner_is_refused_before_anything_is_measured() -> None:
 
 @pytest.mark.slow
 def test_a_row_for_each_size_and_share_of_flipped_labels() -> None:
-    rows = list(measure("lhs", (40, 4_000)))
+    rows = list(measure("lhs", (40, 100_000)))
     assert [(row.trials, row.flipped) for row in rows] == [
-        (40, 0.0), (40, 0.1), (4_000, 0.0), (4_000, 0.1)
+        (40, 0.0), (40, 0.1), (100_000, 0.0), (100_000, 0.1)
     ]  # fmt: skip
     assert rows[-1].tell_s > rows[0].tell_s
-    assert rows[-1].memory_mb > 4_000 * 23 * 8 / 1e6
+    # What the imports had needed for a moment hides a part of it.
+    assert rows[-1].memory_mb > 0.5 * 100_000 * 23 * 8 / 1e6
 
 
 @pytest.mark.bench
