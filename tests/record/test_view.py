@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -329,8 +330,9 @@ def test_a_live_view_of_a_stopped_viewer_holds_what_its_inbox_has_room_for(
 def test_with_its_command_the_viewer_itself_is_ended_even_if_it_is_stopped() -> None:
     with a_viewer() as (child, _):
         (proper,) = children(child.pid)
+        ending = os.pidfd_open(proper)
         os.kill(proper, signal.SIGSTOP)
-    assert not running(proper)
+    assert ends(ending)
     assert not running(child.pid)
 
 
@@ -338,9 +340,16 @@ def test_with_its_command_the_viewer_itself_is_ended_even_if_it_is_stopped() -> 
 def test_with_its_command_killed_the_viewer_itself_is_ended() -> None:
     with a_viewer() as (child, _):
         (proper,) = children(child.pid)
+        ending = os.pidfd_open(proper)
         child.kill()
         child.wait()
-    assert not running(proper)
+    assert ends(ending)
+
+
+def ends(pidfd: int) -> bool:
+    """Wait until a process that is nobody's child here has ended."""
+    with os.fdopen(pidfd):
+        return bool(select.select([pidfd], [], [], 10.0)[0])
 
 
 def children(pid: int) -> list[int]:
