@@ -147,6 +147,11 @@ def _headless() -> Iterator[ViewerClient]:
         ) from error
     try:
         yield client
+    except RuntimeError as error:  # Rerun's, when the viewer has gone
+        raise RecordError(
+            "the viewer ended before its picture was taken: it needs a graphics driver, a software"
+            f" one will do: {error}"
+        ) from error
     finally:
         client.quit()
 
