@@ -156,13 +156,6 @@ class Exchange:
             else:
                 self._await(postman)
 
-    def has_more(self) -> bool:
-        """Tell whether there is something else for the trial's thread to do."""
-        with self.lock:
-            if self.postman is not None:
-                self.postman.clear()
-            return bool(self.jobs)
-
     def tell(self, event: Event) -> None:
         """Have an event of the trial's thread acted upon at once, without another thread."""
         with self.lock:

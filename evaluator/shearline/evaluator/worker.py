@@ -41,10 +41,6 @@ log = logging.getLogger(__name__)
 #: How long the trial's thread may take to hear that it is over [s].
 FAREWELL_S = 0.3
 
-#: After a trial of this length [s] the next one begins at once and the postman's thread sends the
-#: result meanwhile; after a shorter one that would only cost another thread.
-HAND_OVER_S = 0.002
-
 #: Trials that follow each other faster than this share one line of the log [s].
 LOG_EVERY_S = 0.02
 
@@ -204,11 +200,7 @@ class Worker:
             self._deadline_s = time.monotonic() + trial.deadline_s
             verdict = run_trial(self._task, trial.theta, trial.seed, self._beat, self._space)
             exchange.running = ""
-        ended = Ended(self._result(trial, verdict))
-        if verdict.wall_s >= HAND_OVER_S and exchange.has_more():
-            exchange.put(ended)
-        else:
-            exchange.tell(ended)
+        exchange.tell(Ended(self._result(trial, verdict)))
         self._log(trial, verdict)
         if self._config.traces and verdict.trace is not None:
             self._show(verdict.trace, trial)
