@@ -12,8 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shearline.evaluator.base import Outcome, TrialAborted
-from shearline.evaluator.keylock import KeylockTask, draw_setup
-from shearline.evaluator.keylock_spec import LEVELS, keylock_spec, level
+from shearline.evaluator.keylock import KeylockTask
+from shearline.evaluator.keylock_draw import draw_setup
+from shearline.evaluator.keylock_spec import keylock_spec
+from shearline.evaluator.keylock_variation import LEVELS, level
 from shearline.evaluator.skill.baselines import TUPLES, tuple_of
 from shearline.evaluator.skill.parameters import BOUNDS, space
 from shearline.protocol.errors import ConfigError

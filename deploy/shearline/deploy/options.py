@@ -88,7 +88,9 @@ def add_run(command: argparse.ArgumentParser) -> None:
     """Arguments that say what a run is; each overrides the TOML file, if one is given."""
     group = command.add_argument_group("the run")
     group.add_argument(
-        "--task", help="keylock, keylock-limit, keylock-jam, sphere, or file:function"
+        "--task",
+        help="keylock, keylock-limit, keylock-jam, with switches behind it or without"
+        " (keylock+grasp+noise), sphere, or file:function",
     )
     learners = "psp-ranked (default), psp, psp-paper, hireps, cmaes, ga, pso, lhs, random"
     group.add_argument("--learner", help=learners)

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from shearline.evaluator.base import Array, Outcome, Task
+from shearline.evaluator.keylock_variation import LEVELS, is_keylock
 from shearline.protocol.errors import ConfigError
 from shearline.protocol.task import TaskSpec
 
@@ -22,13 +23,12 @@ _NAP_S = 0.05
 _BENCHMARK_N = 20
 
 _BENCHMARKS = ("sphere", "rastrigin")
-_KEYLOCKS = ("keylock", "keylock-limit", "keylock-jam")
 _SLEEP = re.compile(r"sleep(?:-(\d{1,6}))?")
 
 
 def builtin_names() -> tuple[str, ...]:
-    """Return the names that :func:`builtin_task` knows."""
-    return (*_KEYLOCKS, *_BENCHMARKS, "sleep-MS")
+    """Return the names that :func:`builtin_task` knows; a level may have switches behind it."""
+    return (*LEVELS, *_BENCHMARKS, "sleep-MS")
 
 
 def builtin_task(name: str) -> Task:
@@ -37,7 +37,7 @@ def builtin_task(name: str) -> Task:
     Raises:
         ConfigError: If there is none of that name, or what it needs is not installed.
     """
-    if name in _KEYLOCKS:
+    if is_keylock(name):
         return _keylock(name)
     if name in _BENCHMARKS:
         return _benchmark(name)
@@ -56,7 +56,7 @@ def builtin_spec(name: str) -> TaskSpec:
     Raises:
         ConfigError: As :func:`builtin_task`.
     """
-    if name in _KEYLOCKS:
+    if is_keylock(name):
         from shearline.evaluator.keylock_spec import keylock_spec  # noqa: PLC0415 - see module
 
         return keylock_spec(name)

@@ -12,14 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shearline.evaluator.base import Array, Outcome, TrialAborted
-from shearline.evaluator.keylock_spec import (
-    COST_PER_M,
-    ROI_M,
-    SKILL_VERSION,
-    Level,
-    keylock_spec,
-    level,
-)
+from shearline.evaluator.keylock_draw import draw_setup, scene_of
+from shearline.evaluator.keylock_spec import COST_PER_M, ROI_M, SKILL_VERSION, keylock_spec
+from shearline.evaluator.keylock_variation import level
 from shearline.evaluator.skill.parameters import parameters
 from shearline.protocol.pose import Placed
 from shearline.protocol.scene import SceneData
@@ -40,13 +35,14 @@ class KeylockTask:
     """Insert a key into a lock that is not quite where it is believed to be.
 
     Args:
-        name: Level: ``"keylock"``, ``"keylock-limit"`` or ``"keylock-jam"``.
-        scene: Scene to simulate; the default is the one all figures are measured with.
+        name: Level: ``"keylock"``, ``"keylock-limit"`` or ``"keylock-jam"``, with or without
+            switches behind it (:mod:`shearline.evaluator.keylock_variation`).
+        scene: Scene to simulate; the default is the level's own.
         extract: Whether each trial pulls the key out again after the verdict. Costs time and
             decides nothing in simulation, where each trial starts from a reset.
 
     Raises:
-        ConfigError: If there is no such level.
+        ConfigError: If there is no such level or switch.
     """
 
     def __init__(
@@ -75,7 +71,7 @@ class KeylockTask:
         if self._plant is None:
             from shearline.sims.mujoco_plant import MujocoPlant  # noqa: PLC0415 - see module
 
-            self._plant = MujocoPlant(self._scene)
+            self._plant = MujocoPlant(self._scene or scene_of(self._level))
         return self._plant
 
     def warm(self) -> None:
@@ -161,24 +157,3 @@ def _placed(setup: Setup) -> Placed:
 
     w, x, y, z = quaternion(setup.lock.rotation).tolist()
     return Placed(body="lock", position=setup.lock.position.tolist(), quaternion=[x, y, z, w])
-
-
-def draw_setup(chosen: Level, seed: int) -> tuple[Setup, Array]:
-    """Draw what differs in the trial with this seed.
-
-    Returns:
-        The setup, and the lock's true pose off the believed one ``(6,)`` [m, rad].
-    """
-    from shearline.sims.lock import PINS  # noqa: PLC0415
-    from shearline.sims.plant import Setup  # noqa: PLC0415
-    from shearline.sims.scene import believed_lock_pose  # noqa: PLC0415
-
-    rng = np.random.default_rng(seed)
-    off = np.clip(rng.standard_normal(6), -2.0, 2.0)
-    off[:3] *= chosen.offset_m
-    off[3:] *= chosen.tilt_rad
-    friction = None if chosen.friction is None else float(rng.uniform(*chosen.friction))
-    spread = chosen.pin_spread
-    scale = tuple(float(f) for f in rng.uniform(1.0 - spread, 1.0 + spread, PINS))
-    pose = believed_lock_pose().moved(off[:3], off[3:])
-    return Setup(lock=pose, friction=friction, pin_scale=scale), off

@@ -33,8 +33,8 @@ from shearline.evaluator.skill.skill import State, empty_state, tick
 from shearline.evaluator.skill.trace import COLUMNS, write_row
 from shearline.sims.compiled import compiled
 from shearline.sims.mujoco_plant import Handles, MujocoPlant, begin_tick, end_tick
-from shearline.sims.panda import Array
-from shearline.sims.plant import Plant, Setup
+from shearline.sims.panda import JOINTS, Array
+from shearline.sims.plant import Percept, Plant, Setup
 from shearline.sims.scene import TICK_S
 
 #: No trial is longer than all its phases together [s].
@@ -82,12 +82,12 @@ def execute_compiled(
         PlantError: If the simulation is no longer physical.
     """
     rows = np.empty((TICKS_MAX, len(COLUMNS))) if rows is None else rows
-    state, now, done = _begin(plant, setup, job), beginning(), 0
+    state, now, done, noise = _begin(plant, setup, job), beginning(), 0, noise_of(setup)
     while not _finished(now, extract=job.extract):
         if done >= TICKS_MAX:
             raise TrialAborted(f"no verdict after {TRIAL_MAX_S:.1f} s: the skill does not end")
         until = min(done + CHUNK_TICKS, TICKS_MAX)
-        now, done = run_ticks(plant.handles, state, now, job, rows, done, until)
+        now, done = run_ticks(plant.handles, state, now, job, noise, rows, done, until)
         plant.check()
         beat()
     return now, rows[:done]
@@ -98,11 +98,12 @@ def execute(
 ) -> tuple[Decision, Array]:
     """Run one trial on any plant, tick by tick; arguments and results as above."""
     rows = np.empty((TICKS_MAX, len(COLUMNS)))
-    state, now, done = _begin(plant, setup, job), beginning(), 0
+    state, now, done, noise = _begin(plant, setup, job), beginning(), 0, noise_of(setup)
     while not _finished(now, extract=job.extract):
         if done >= TICKS_MAX:
             raise TrialAborted(f"no verdict after {TRIAL_MAX_S:.1f} s: the skill does not end")
         plant.sense(state.percept)
+        disturb(state.percept, noise, done)
         now = tick(state, now, job.p, job.limits, job.arm, TICK_S)
         write_row(rows[done], state, now)
         plant.step(state.feel.tau)
@@ -112,12 +113,26 @@ def execute(
     return now, rows[:done]
 
 
+def noise_of(setup: Setup) -> Array:
+    """Return what the torque sensors add in each tick ``(ticks, 7)`` [N m]; no rows: nothing."""
+    return np.empty((0, JOINTS)) if setup.noise is None else setup.noise.samples(TICKS_MAX)
+
+
+@compiled
+def disturb(percept: Percept, noise: Array, tick: int) -> None:
+    """Add the sensors' error of one tick to the contact torques, if there is any."""
+    if tick < noise.shape[0]:
+        for j in range(JOINTS):
+            percept.contact[j] += noise[tick, j]
+
+
 @compiled
 def run_ticks(
     handles: Handles,
     state: State,
     now: Decision,
     job: Job,
+    noise: Array,
     rows: Array,
     done: int,
     until: int,
@@ -125,6 +140,7 @@ def run_ticks(
     """Run ticks ``done`` to ``until`` or to the end of the skill; return where it stands."""
     while done < until:
         begin_tick(handles, state.percept)
+        disturb(state.percept, noise, done)
         now = tick(state, now, job.p, job.limits, job.arm, TICK_S)
         write_row(rows[done], state, now)
         end_tick(handles, state.feel.tau)
