@@ -92,7 +92,7 @@ def add_run(command: argparse.ArgumentParser) -> None:
         help="keylock, keylock-limit, keylock-jam, with switches behind it or without"
         " (keylock+grasp+noise), sphere, or file:function",
     )
-    learners = "psp-ranked (default), psp, psp-paper, hireps, cmaes, ga, pso, lhs, random"
+    learners = "psp-ranked (default), psp, psp-paper, hireps, cmaes, ga, pso, lhs, random, tpe"
     group.add_argument("--learner", help=learners)
     group.add_argument("--episodes", type=positive, metavar="K", help="updates (default 10)")
     group.add_argument("--trials", type=positive, metavar="N", help="per episode (default 20)")

@@ -77,7 +77,7 @@ def register(kinds: Subparsers) -> None:
             " again, only what is missing is run.",
         )
         kind.add_argument("--level", default=LEVELS[0], metavar="TASK", help=", ".join(LEVELS))
-        kind.add_argument("--learners", nargs="+", metavar="NAME", help="default: all")
+        kind.add_argument("--learners", nargs="+", metavar="NAME", help="default: all but tpe")
         kind.add_argument("--plant", choices=PLANTS, default=PLANTS[0], help="what to act on")
         kind.add_argument("--markdown", action="store_true", help="print tables as Markdown")
         kind.add_argument("--no-picture", action="store_true", help="draw nothing")
@@ -132,13 +132,12 @@ def _add_common(kind: argparse.ArgumentParser) -> None:
 
 def run(name: str, arguments: argparse.Namespace) -> int:
     """Run what is missing, saying what each run came to, then print tables and draw."""
-    from shearline.deploy.studies.contenders import CONTENDERS, OPTIONAL, contender  # noqa: PLC0415
+    from shearline.deploy.studies.contenders import USUAL, contender  # noqa: PLC0415
     from shearline.deploy.studies.dataset import Wanted  # noqa: PLC0415 - loads zenoh
     from shearline.studies import section5  # noqa: PLC0415
 
     study = STUDIES[name]
-    usual = [one for one in CONTENDERS if one not in OPTIONAL]
-    asked = dict.fromkeys(map(contender, arguments.learners or usual))
+    asked = dict.fromkeys(map(contender, arguments.learners or USUAL))
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.experiments)
     gathering, size = _gathering(arguments), _size(arguments)
     wanted = [

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from shearline.learner.registry import ALIASES
+from shearline.learner.registry import ALIASES, EXTRAS
 from shearline.protocol.errors import ConfigError
 from shearline.protocol.space import Space
 
@@ -51,8 +51,8 @@ _ALL = (
     Contender("centre-push", "plan", _pushed),
 )
 CONTENDERS: Mapping[str, Contender] = MappingProxyType({one.name: one for one in _ALL})
-#: Those that need more than the usual install take part when they are asked for.
-OPTIONAL = frozenset({"tpe"})
+#: Those that every install has; the others take part when they are asked for.
+USUAL = tuple(name for name, one in CONTENDERS.items() if one.learner not in EXTRAS)
 
 
 def contender(name: str) -> Contender:

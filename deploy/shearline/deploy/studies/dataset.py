@@ -21,7 +21,7 @@ from shearline.deploy.studies.lanes import Effort, Lanes, is_complete
 from shearline.deploy.studies.trials_of import outcomes, ran
 from shearline.deploy.table import duration
 from shearline.evaluator.builtin import builtin_spec
-from shearline.learner.registry import LEARNERS
+from shearline.learner.registry import EXTRAS, LEARNERS
 from shearline.learner.run.config import RunConfig, to_toml
 from shearline.learner.run.folder import CONFIG, SUMMARY
 from shearline.protocol.messages import Purpose
@@ -190,13 +190,13 @@ class Gathering:
 def _write_down(folder: Path, config: RunConfig) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / CONFIG).write_text(to_toml(config))
-    if config.learner in LEARNERS and not (folder / CODE).exists():
+    if config.learner in {*LEARNERS, *EXTRAS} and not (folder / CODE).exists():
         (folder / CODE).write_text(code_of(config.learner))
 
 
 def _heed_code(folders: Sequence[Path], wanted: Sequence[Wanted], *, renew: bool) -> None:
     """Say which complete runs were made by other code of their learner, or remove them."""
-    learners = {one.contender.learner for one in wanted} & set(LEARNERS)
+    learners = {one.contender.learner for one in wanted} & {*LEARNERS, *EXTRAS}
     code = {learner: code_of(learner) for learner in learners}
     old = [
         (one.contender.name, folder)
