@@ -109,6 +109,12 @@ def add_run(command: argparse.ArgumentParser) -> None:
         metavar="N",
         help="and N tuples drawn from the recommended region",
     )
+    group.add_argument(
+        "--warm-start",
+        metavar="RUN",
+        help="start from the trials of another run on the same parameters; they fade by half"
+        " with every episode",
+    )
     group.add_argument("--lease", type=seconds, metavar="S", help="lease of an attempt [s]")
     group.add_argument("--out", metavar="RUN_DIR", help="run folder (default runs/TASK-TIME)")
     group.add_argument("--no-record", action="store_true", help="write no record.mcap")
@@ -129,6 +135,7 @@ def run_arguments(arguments: argparse.Namespace) -> list[str]:
         "--seed": arguments.seed,
         "--confirm": arguments.confirm,
         "--confirm-region": arguments.confirm_region,
+        "--warm-start": arguments.warm_start,
         "--lease": arguments.lease,
     }
     words = [str(arguments.config)] if arguments.config is not None else []

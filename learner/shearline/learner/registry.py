@@ -33,6 +33,9 @@ LEARNERS: Mapping[str, str] = MappingProxyType(
 #: Learners that need more than the extra ``learner``; studies of all learners leave them out.
 EXTRAS: Mapping[str, str] = MappingProxyType({"tpe": "shearline.learner.tpe:TPE"})
 
+#: Those that can start from the trials of another run.
+PRIMED = frozenset({"psp-ranked", "psp", "psp-paper", "tpe"})
+
 #: Not an optimiser, so not listed: it tries the tuples it is given, ``tuples=[...]``.
 UNLISTED: Mapping[str, str] = MappingProxyType({"plan": "shearline.learner.plan:Plan"})
 

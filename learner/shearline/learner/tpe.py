@@ -32,6 +32,7 @@ class TPE(EpisodicLearner):
     """
 
     name = "tpe"
+    primes = True
 
     _study: Any = None
     _axes: Mapping[str, Any] = MappingProxyType({})
