@@ -33,9 +33,7 @@ class BulletPlant:
         settings: How Bullet is to solve it.
     """
 
-    def __init__(
-        self, scene: Scene | None = None, settings: BulletSettings | None = None
-    ) -> None:
+    def __init__(self, scene: Scene | None = None, settings: BulletSettings | None = None) -> None:
         self.scene = scene or Scene()
         self.settings = settings or BulletSettings()
         self.world = BulletWorld(self.scene, self.settings)

@@ -8,7 +8,6 @@ the product that Bullet takes of two. Knows neither ticks nor percepts.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import importlib
 import os
 import sys
@@ -20,16 +19,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from shearline.sims import urdf
 from shearline.sims.dynamics import GRAVITY
 from shearline.sims.lock import PINS
 from shearline.sims.panda import JOINTS, Array
 from shearline.sims.scene import TICK_S, Pose, Scene, quaternion
 
-#: Collision groups; a link meets those of its mask.
-_WALLS, _BLADE, _PINS, _BITTING = 1, 2, 4, 8
+#: Bullet numbers joints, and the links behind them, in the order of the file.
+_JOINTS, _PINS = tuple(range(JOINTS)), tuple(range(PINS))
+_BLADE, _BITTING = JOINTS, JOINTS + 1
 
 #: More than any gear has to carry [N m].
 _GEAR_MAX = 1e5
@@ -39,17 +37,26 @@ _GEAR_MAX = 1e5
 class BulletSettings:
     """How Bullet solves the scene; the defaults are the ones shown to be converged.
 
+    Contacts are springs and dampers between steel and brass, not rigid: what a rigid one sinks in
+    by has to be pushed out again within a few steps, and a micrometre in a wedge then takes a
+    thousand newtons.
+
     Attributes:
         substeps: Steps of the engine in one tick of the controller.
         iterations: Of the solver, at most.
         residual: Sum of squared changes of impulses at which the solver stops [N^2 s^2].
-        near_m: Distance at which contacts begin to be watched [m].
+        stiffness: Of contacts [N/m].
+        damping: Of contacts [N s/m].
+        near: Contacts are watched from this share of the smaller body's reach on: 36 um before the
+            walls, 100 um before the pins.
     """
 
-    substeps: int = 2
-    iterations: int = 200
-    residual: float = 1e-14
-    near_m: float = 2e-4
+    substeps: int = 1
+    iterations: int = 100
+    residual: float = 1e-9
+    stiffness: float = 1e7
+    damping: float = 1e4
+    near: float = 1e-3
 
     @property
     def timestep_s(self) -> float:
@@ -71,15 +78,14 @@ class BulletWorld:
         self._scene = scene
         self.files = {
             "arm.urdf": urdf.arm(scene),
-            "lock.urdf": urdf.lock(scene),
+            "rotors.urdf": urdf.rotors(),
+            "walls.urdf": urdf.lock_walls(scene),
+            "pins.urdf": urdf.lock_pins(scene),
             urdf.BITTING_MESH: urdf.bitting_mesh(scene.lock.key),
         }
         self._client = self._bullet.connect(self._bullet.DIRECT)
         weakref.finalize(self, _disconnect, self._bullet, self._client)
-        self._arm = self._lock = -1
-        self._joints: list[int] = []
-        self._turning: list[int] = []
-        self._pins: list[int] = []
+        self._arm = self._rotors = self._walls = self._pins = -1
 
     def build(self, lock: Pose, friction: float, q: Sequence[float]) -> None:
         """Throw away what there was and load everything anew, at rest.
@@ -98,7 +104,7 @@ class BulletWorld:
             fixedTimeStep=self._settings.timestep_s,
             numSolverIterations=self._settings.iterations,
             solverResidualThreshold=self._settings.residual,
-            contactBreakingThreshold=self._settings.near_m,
+            contactBreakingThreshold=self._settings.near,
             contactSlop=0.0,
             enableConeFriction=1,
             deterministicOverlappingPairs=1,
@@ -109,27 +115,29 @@ class BulletWorld:
         with tempfile.TemporaryDirectory(prefix="shearline-") as folder:
             for name, text in self.files.items():
                 Path(folder, name).write_text(text)
-            self._arm = self._load(folder, "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-            self._lock = self._load(folder, "lock", lock.position.tolist(), (x, y, z, w))
-        self._name_joints()
+            self._arm = self._load(folder, "arm")
+            self._rotors = self._load(folder, "rotors")
+            place = (lock.position.tolist(), (x, y, z, w))
+            self._walls = self._load(folder, "walls", *place, useMaximalCoordinates=True)
+            self._pins = self._load(folder, "pins", *place)
         self._release()
         self._gear()
         self._collide(friction)
-        for joint, angle in zip(self._joints, q, strict=True):
+        for joint, angle in enumerate(q):
             b.resetJointState(self._arm, joint, angle, physicsClientId=client)
 
     def arm(self, state: Array) -> None:
         """Fill ``state (3, 7)``: angles [rad], speeds, speeds of the flywheels [rad/s]."""
-        found = self._bullet.getJointStates(
-            self._arm, self._turning, physicsClientId=self._client
-        )
+        b, client = self._bullet, self._client
+        moving = b.getJointStates(self._arm, _JOINTS, physicsClientId=client)
+        turning = b.getJointStates(self._rotors, _JOINTS, physicsClientId=client)
         for j in range(JOINTS):
-            state[0, j], state[1, j] = found[j][:2]
-            state[2, j] = found[JOINTS + j][1]
+            state[0, j], state[1, j] = moving[j][:2]
+            state[2, j] = turning[j][1]
 
     def pins(self, travel: Array) -> None:
         """Fill ``travel (5,)`` [m]."""
-        found = self._bullet.getJointStates(self._lock, self._pins, physicsClientId=self._client)
+        found = self._bullet.getJointStates(self._pins, _PINS, physicsClientId=self._client)
         for i in range(PINS):
             travel[i] = found[i][0]
 
@@ -142,101 +150,94 @@ class BulletWorld:
         """
         b, client = self._bullet, self._client
         b.setJointMotorControlArray(
-            self._arm, self._joints, b.TORQUE_CONTROL, forces=tau, physicsClientId=client
+            self._arm, _JOINTS, b.TORQUE_CONTROL, forces=tau, physicsClientId=client
         )
         b.setJointMotorControlArray(
-            self._lock, self._pins, b.TORQUE_CONTROL, forces=springs, physicsClientId=client
+            self._pins, _PINS, b.TORQUE_CONTROL, forces=springs, physicsClientId=client
         )
         b.stepSimulation(physicsClientId=client)
 
-    def _load(self, folder: str, name: str, at: Sequence[float], turn: Sequence[float]) -> int:
+    def _load(self, folder: str, name: str, *place: Sequence[float], **how: bool) -> int:
         b = self._bullet
         body: int = b.loadURDF(
             f"{folder}/{name}.urdf",
-            at,
-            turn,
+            *place,
             useFixedBase=True,
             flags=b.URDF_USE_INERTIA_FROM_FILE,
             physicsClientId=self._client,
+            **how,
         )
         return body
-
-    def _name_joints(self) -> None:
-        arm, lock = self._indices(self._arm), self._indices(self._lock)
-        self._joints = [arm[f"link{j + 1}"] for j in range(JOINTS)]
-        self._turning = [*self._joints, *(arm[name] for name in urdf.FLYWHEELS)]
-        self._pins = [lock[pin.name] for pin in self._scene.lock.pins()]
-        self._blade, self._bitting = arm[urdf.BLADE], arm[urdf.BITTING]
-
-    def _indices(self, body: int) -> dict[str, int]:
-        b, client = self._bullet, self._client
-        found = (
-            b.getJointInfo(body, i, physicsClientId=client)
-            for i in range(b.getNumJoints(body, physicsClientId=client))
-        )
-        return {info[1].decode(): info[0] for info in found}
 
     def _release(self) -> None:
         """Switch off what Bullet switches on by itself: joint motors, and damping by the air."""
         b, client = self._bullet, self._client
-        for body, joints in ((self._arm, self._turning), (self._lock, self._pins)):
+        for body, joints in ((self._arm, _JOINTS), (self._rotors, _JOINTS), (self._pins, _PINS)):
             b.setJointMotorControlArray(
                 body, joints, b.VELOCITY_CONTROL, forces=[0.0] * len(joints), physicsClientId=client
             )
-            b.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
+            b.changeDynamics(
+                body, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client
+            )
 
     def _gear(self) -> None:
         b, client, nowhere = self._bullet, self._client, (0.0, 0.0, 0.0)
-        for joint, flywheel in zip(self._joints, self._turning[JOINTS:], strict=True):
+        for joint in _JOINTS:
             gear = b.createConstraint(
-                self._arm, joint, self._arm, flywheel, b.JOINT_GEAR, (0.0, 0.0, 1.0), nowhere,
+                self._arm, joint, self._rotors, joint, b.JOINT_GEAR, (0.0, 0.0, 1.0), nowhere,
                 nowhere, physicsClientId=client,
             )  # fmt: skip
             b.changeConstraint(gear, gearRatio=-1.0, maxForce=_GEAR_MAX, physicsClientId=client)
 
     def _collide(self, friction: float) -> None:
-        """Let blade and walls meet, and bitting and pins; nothing else."""
+        """Let blade and walls meet, and bitting and pins; nothing else.
+
+        Bullet multiplies the friction of both sides and puts their stiffnesses in series, so one
+        side has the numbers and the other is perfect.
+        """
         b, client = self._bullet, self._client
-        for body, link, group, mask in (
-            (self._lock, -1, _WALLS, _BLADE),
-            (self._arm, self._blade, _BLADE, _WALLS),
-            (self._arm, self._bitting, _BITTING, _PINS),
-            *((self._lock, pin, _PINS, _BITTING) for pin in self._pins),
+        lock = {
+            "lateralFriction": friction,
+            "contactStiffness": self._settings.stiffness,
+            "contactDamping": self._settings.damping,
+        }
+        key = {"lateralFriction": 1.0}
+        for body, link, surface, group, mask in (
+            (self._walls, -1, lock, 1, 2),
+            (self._arm, _BLADE, key, 2, 1),
+            *((self._pins, pin, lock, 4, 8) for pin in _PINS),
+            (self._arm, _BITTING, key, 8, 4),
         ):
             b.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
             b.changeDynamics(
                 body,
                 link,
-                # Bullet takes the product of both sides.
-                lateralFriction=friction if body == self._lock else 1.0,
                 spinningFriction=0.0,
                 rollingFriction=0.0,
                 restitution=0.0,
                 physicsClientId=client,
+                **surface,
             )
 
 
 @cache
 def bullet() -> Any:
-    """Return PyBullet, imported without what it prints about itself on standard output."""
+    """Return PyBullet, imported without the line that it writes about itself."""
     with _mute():
         return importlib.import_module("pybullet")
 
 
 @contextlib.contextmanager
 def _mute() -> Iterator[None]:
-    """Drop what C code prints: standard output is for those who asked for data."""
-    sys.stdout.flush()
-    stdout, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    flush = ctypes.CDLL(None).fflush
-    flush(None)
-    os.dup2(nowhere, 1)
+    """Drop what C code writes on standard error."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
     try:
         yield
     finally:
-        flush(None)
-        os.dup2(stdout, 1)
-        os.close(stdout)
+        os.dup2(kept, 2)
+        os.close(kept)
         os.close(nowhere)
 
 

@@ -1,29 +1,36 @@
-"""The key-in-lock scene as URDF: the arm with the key, and the lock with its pins.
+"""The key-in-lock scene as URDF: the arm with the key, its motors, the walls of the lock, the pins.
 
-The same numbers as in :mod:`shearline.sims.scene`, for an engine that reads URDF. Two things differ
-in form. What may touch what is decided by link, not by shape: so the blade, which meets the walls,
-is a part of the hand, and the bitting, which meets the pins, one of the key. And URDF knows no
-rotor inertia: each joint of the arm comes with a flywheel on the base that is to be geared to it,
-one to one. That adds the rotor's inertia to that joint and to nothing else.
+The same numbers as in :mod:`shearline.sims.scene`, for an engine that reads URDF. It is in four
+bodies because solving a contact costs with the joints of the bodies that meet in it, whether they
+move or not. What may touch what is decided by link: the blade, which meets the walls, is a part of
+the hand, and the bitting, which meets the pins, one of the key.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from shearline.sims import panda
 from shearline.sims.lock import Box, Key, Lock, Pin, Triple, blade, body, walls
 from shearline.sims.panda import Link
 from shearline.sims.scene import KEY_INERTIA, KEY_MASS, KEY_TURN, TIP_M, Scene
 
-#: Links whose collisions the engine has to tell apart.
-BLADE, BITTING = "hand", "key"
-
 #: File beside the arm's from which it takes the surface on which the pins ride.
 BITTING_MESH = "bitting.obj"
 
-#: Joint of the flywheel that is to be geared to each joint of the arm.
-FLYWHEELS = tuple(f"rotor{j + 1}" for j in range(panda.JOINTS))
+#: How far from pins and bitting a grain of dust is stuck to each of them [m]. Bullet watches for
+#: contacts at a distance that grows with how far the smaller of two things extends from its own
+#: origin. Pins are small, but at the corners of the bitting they need to be seen earlier than the
+#: walls: what is seen too late drops into the key, what is seen too early is held off the walls.
+SPECK_M = 0.1
+
+#: How the frame of the bitting's mesh is turned in the key's, about x, then y, then z [rad]: the
+#: key's x axis is its diagonal. Bullet looks for contacts only where boxes around the shapes, along
+#: the axes of the mesh, overlap. Around a triangle that lies in an axis's plane such a box has no
+#: height, and a pin would be let go of as soon as it is a nanometre off.
+_ASKEW: Triple = (0.0, math.pi / 4.0, -math.asin(1.0 / math.sqrt(3.0)))
 
 _ZERO: Triple = (0.0, 0.0, 0.0)
 _BRASS, _STEEL = (0.70, 0.55, 0.26), (0.58, 0.61, 0.66)
@@ -34,33 +41,61 @@ _HAND_TURN = -math.pi / 4.0
 
 
 def arm(scene: Scene) -> str:
-    """Return the arm with the key in its hand, and a flywheel for each joint."""
+    """Return the arm with the key in its hand."""
     parents = ("base", *(link.name for link in panda.LINKS))
     parts = [_link("base", _anchor())]
     for parent, link in zip(parents, panda.LINKS, strict=False):
         parts += [_arm_joint(parent, link), _arm_link(link)]
     key = scene.lock.key
     parts += [
-        _joint("hand", "fixed", (parents[-1], "hand"), (0.0, 0.0, panda.FLANGE_M), (0.0, 0.0, _HAND_TURN)),
+        _joint(
+            "hand",
+            "fixed",
+            (parents[-1], "hand"),
+            (0.0, 0.0, panda.FLANGE_M),
+            (0.0, 0.0, _HAND_TURN),
+        ),
         _hand(key),
-        _joint("key", "fixed", (parents[-1], "key"), (0.0, 0.0, panda.FLANGE_M + TIP_M), (0.0, 0.0, KEY_TURN)),
+        _joint(
+            "key",
+            "fixed",
+            (parents[-1], "key"),
+            (0.0, 0.0, panda.FLANGE_M + TIP_M),
+            (0.0, 0.0, KEY_TURN),
+        ),
         _key(key),
     ]
-    for name in FLYWHEELS:
-        turning = (panda.ARMATURE,) * 3
-        parts += [
-            _joint(name, "continuous", ("base", name), _ZERO),
-            _link(name, _inertial(1.0, _ZERO, turning)),
-        ]
     return _robot("arm", parts)
 
 
-def lock(scene: Scene) -> str:
-    """Return the lock; its base stands where the lock's frame stands."""
-    parts = [_link("lock", _anchor(), *(_touched(box, _BRASS) for box in walls(scene.lock)))]
+def rotors() -> str:
+    """Return the rotors of the arm's motors, each a flywheel on an axis of its own.
+
+    Geared one to one to a joint of the arm, a flywheel adds the rotor's inertia to that joint and
+    to nothing else: what URDF has no word for.
+    """
+    parts = [_link("motors", _anchor())]
+    for link in panda.LINKS:
+        name = f"rotor of {link.name}"
+        parts += [
+            _joint(name, "continuous", ("motors", name), _ZERO),
+            _link(name, _inertial(1.0, _ZERO, (panda.ARMATURE,) * 3)),
+        ]
+    return _robot("rotors", parts)
+
+
+def lock_walls(scene: Scene) -> str:
+    """Return the lock without its pins; it stands where the lock's frame stands."""
+    boxes = (_touched(box, _BRASS) for box in walls(scene.lock))
+    return _robot("walls", [_link("walls", _anchor(), *boxes)])
+
+
+def lock_pins(scene: Scene) -> str:
+    """Return the pins of the lock, in the lock's frame."""
+    parts = [_link("lock", _anchor())]
     for pin in scene.lock.pins():
         parts += [_pin_joint(pin, scene.lock), _pin_link(pin, scene.lock)]
-    return _robot("lock", parts)
+    return _robot("pins", parts)
 
 
 def bitting_mesh(key: Key) -> str:
@@ -68,10 +103,13 @@ def bitting_mesh(key: Key) -> str:
 
     Bullet rounds every box by 1 mm where a capsule meets it, and lets nobody change that for a
     link that moves: slabs of 1 mm, as MuJoCo has them, would turn into something else. A surface
-    of triangles is not rounded.
+    of triangles is not rounded. It is written in a frame of its own (:data:`_ASKEW`).
     """
     half, corners = key.thickness_m / 2.0, key.profile()
-    lines = [f"v {x!r} {y!r} {-s!r}" for s, y in corners for x in (half, -half)]
+    _, pitch, yaw = _ASKEW
+    turn = panda.rotation_z(yaw) @ panda.rotation_y(pitch)
+    points = [turn.T @ np.array([x, y, -s]) for s, y in corners for x in (half, -half)]
+    lines = ["v " + " ".join(repr(float(value)) for value in point) for point in points]
     for i in range(len(corners) - 1):
         a, b, c, d = (2 * i + k for k in (1, 2, 3, 4))
         lines += [f"f {a} {b} {d}", f"f {a} {d} {c}"]
@@ -101,7 +139,7 @@ def _hand(key: Key) -> str:
     turn = KEY_TURN - _HAND_TURN
     palm = '<box size="0.04 0.18 0.06"/>'
     return _link(
-        BLADE,
+        "hand",
         _inertial(panda.HAND_MASS, panda.HAND_CENTRE, panda.HAND_INERTIA),
         _collision(_box(outline), centre, (0.0, 0.0, turn)),
         _seen(palm, _WHITE, (0.0, 0.0, 0.03)),
@@ -110,9 +148,10 @@ def _hand(key: Key) -> str:
 
 def _key(key: Key) -> str:
     return _link(
-        BITTING,
+        "key",
         _inertial(KEY_MASS, (0.0, 0.0, -key.length_m), KEY_INERTIA),
-        _collision(f'<mesh filename="{BITTING_MESH}"/>', concave=True),
+        _collision(f'<mesh filename="{BITTING_MESH}"/>', turn=_ASKEW, concave=True),
+        _speck(-SPECK_M),
         *(_seen(_box(box), _STEEL, box.centre, _turns(box)) for box in body(key)),
     )
 
@@ -135,8 +174,14 @@ def _pin_link(pin: Pin, lock: Lock) -> str:
         pin.name,
         _inertial(lock.pin_mass, middle, (inertia,) * 3),
         _collision(shape, middle, along_y),
+        _speck(SPECK_M),
         _seen(shape, _RED, middle, along_y),
     )
+
+
+def _speck(y: float) -> str:
+    """Return a grain of dust that touches nothing; see :data:`SPECK_M`."""
+    return _collision('<sphere radius="0.0001"/>', (0.0, y, 0.0))
 
 
 def _robot(name: str, parts: list[str]) -> str:

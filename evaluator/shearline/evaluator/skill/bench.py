@@ -17,7 +17,7 @@ import numpy as np
 
 from shearline.evaluator.keylock import KeylockTask, draw_setup
 from shearline.evaluator.keylock_spec import level
-from shearline.evaluator.skill.execute import execute_compiled, run_ticks
+from shearline.evaluator.skill.loop import execute_compiled, run_ticks
 from shearline.evaluator.skill.semantic import OPEN, beginning
 from shearline.evaluator.skill.skill import empty_state
 from shearline.evaluator.skill.trace import COLUMNS
