@@ -129,7 +129,7 @@ def test_another_seed_gives_another_trace(task: KeylockTask) -> None:
 def test_a_friction_of_one_trial_does_not_leak_into_the_next(task: KeylockTask) -> None:
     before = task.run(tuple_of(TUPLES["centre-push"]), 6, lambda: None).digest
     jam = KeylockTask("keylock-jam")
-    jam._plant = task.plant
+    jam.plant = task.plant
     jam.run(tuple_of(TUPLES["centre-push"]), 6, lambda: None)
     assert task.run(tuple_of(TUPLES["centre-push"]), 6, lambda: None).digest == before
 

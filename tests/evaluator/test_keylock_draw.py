@@ -11,7 +11,8 @@ import pytest
 from shearline.evaluator.keylock import KeylockTask
 from shearline.evaluator.keylock_draw import draw_setup, scene_of
 from shearline.evaluator.keylock_variation import level
-from shearline.evaluator.skill.execute import execute, execute_compiled, noise_of
+from shearline.evaluator.skill.execute import execute, noise_of
+from shearline.evaluator.skill.loop import execute_compiled
 from shearline.evaluator.skill.trace import digest
 from shearline.sims.plant import Setup
 from shearline.sims.scene import Scene

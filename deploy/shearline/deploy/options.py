@@ -9,6 +9,10 @@ from typing import TypeAlias
 # argparse gives what add_subparsers() returns no public name.
 Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001
 
+#: What evaluators can act on, the usual one first; as in :mod:`shearline.evaluator.plants`, which
+#: is not loaded to parse arguments.
+PLANTS = ("mujoco", "pybullet")
+
 #: Where a learner listens when nobody says otherwise: this machine only.
 ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -63,6 +67,13 @@ def add_connect(command: argparse.ArgumentParser, *, patience_s: float = 5.0) ->
         default=ENDPOINT,
         metavar="ENDPOINT",
         help=f"the learner's endpoint (default {ENDPOINT})",
+    )
+
+
+def add_plant(command: argparse.ArgumentParser) -> None:
+    """``--plant``: what evaluators act on."""
+    command.add_argument(
+        "--plant", choices=PLANTS, default=PLANTS[0], help=f"what to act on (default {PLANTS[0]})"
     )
 
 

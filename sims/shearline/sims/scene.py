@@ -29,7 +29,9 @@ TIP_M = panda.HAND_REACH_M + 38e-3
 #: The key's x axis (thickness) is the closing direction of the fingers.
 KEY_TURN = math.pi / 4.0
 
+#: The key with its bow: mass [kg], inertia about its centre of mass at the bow [kg m^2].
 KEY_MASS = 0.02
+KEY_INERTIA = (4e-6, 4e-6, 2e-6)
 
 #: One tick of the controller [s].
 TICK_S = 1e-3
@@ -246,7 +248,7 @@ def _tool(scene: Scene) -> str:
 <geom class="drawn" type="box" pos="0 -.012 .082" size=".009 .011 .028" rgba=".30 .33 .38 1"/>
 </body>
 {_held(scene.grasp, place)}<body name="key" {place}>
-<inertial pos="0 0 {-key.length_m!r}" mass="{KEY_MASS!r}" diaginertia="4e-6 4e-6 2e-6"/>
+<inertial pos="0 0 {-key.length_m!r}" mass="{KEY_MASS!r}" diaginertia="{_micro(KEY_INERTIA)}"/>
 {_grip(scene.grasp)}<site name="tip" size="0.0003" group="5"/>
 <geom class="drawn" type="box" pos="0 0 {-key.length_m - bow / 2.0!r}"
  size="{key.thickness_m / 2.0!r} .0095 {bow / 2.0!r}" rgba=".58 .61 .66 1"/>
@@ -303,6 +305,10 @@ def _geom(box: Box, kind: str, rgba: str = "") -> str:
         f'<geom name="{box.name}" class="{kind}" type="box" pos="{_text(box.centre)}"'
         f' size="{_text(box.half)}" quat="{_text(quat)}"{colour}/>\n'
     )
+
+
+def _micro(values: tuple[float, ...]) -> str:
+    return " ".join(f"{1e6 * value:g}e-6" for value in values)
 
 
 def _text(values: tuple[float, ...] | Array) -> str:

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shearline.deploy.exits import Exit
-from shearline.deploy.options import Subparsers, add_json, at_least, positive
+from shearline.deploy.options import Subparsers, add_json, add_plant, at_least, positive
+from shearline.evaluator.plants import DEFAULT, PLANTS
 from shearline.protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -22,9 +23,10 @@ if TYPE_CHECKING:
     from shearline.studies.section5 import Table
 
 LEVELS = ("keylock", "keylock-limit", "keylock-jam")
-PLANTS = ("mujoco",)
 #: What a lab varies all at once, for transfer; levels that have some of it leave that out.
 VARIATION = ("friction", "pins", "grasp", "pads", "noise")
+#: Of that, what every plant honours.
+EVERYWHERE = ("friction", "pins", "noise")
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +80,7 @@ def register(kinds: Subparsers) -> None:
         )
         kind.add_argument("--level", default=LEVELS[0], metavar="TASK", help=", ".join(LEVELS))
         kind.add_argument("--learners", nargs="+", metavar="NAME", help="default: all but tpe")
-        kind.add_argument("--plant", choices=PLANTS, default=PLANTS[0], help="what to act on")
+        add_plant(kind)
         kind.add_argument("--markdown", action="store_true", help="print tables as Markdown")
         kind.add_argument("--no-picture", action="store_true", help="draw nothing")
         _add_common(kind)
@@ -94,7 +96,7 @@ def _register_transfer(kinds: Subparsers) -> None:
     )
     kind.add_argument("--learner", default="best", metavar="NAME")
     kind.add_argument("--level", default=LEVELS[0], metavar="TASK", help=", ".join(LEVELS))
-    kind.add_argument("--plants", nargs="+", choices=PLANTS, default=PLANTS)
+    kind.add_argument("--plants", nargs="+", choices=PLANTS, default=[DEFAULT])
     kind.add_argument(
         "--tasks",
         nargs="+",
@@ -165,7 +167,8 @@ def run_transfer(arguments: argparse.Namespace) -> int:
     from shearline.deploy.studies.transfer import places_of, table, transfer  # noqa: PLC0415
     from shearline.evaluator.builtin import builtin_spec  # noqa: PLC0415
 
-    tasks = arguments.tasks or [arguments.level, _varied(arguments.level)]
+    varied = VARIATION if arguments.plants == [DEFAULT] else EVERYWHERE
+    tasks = arguments.tasks or [arguments.level, _varied(arguments.level, varied)]
     tasks = list(dict.fromkeys(builtin_spec(task).name for task in tasks))
     places = places_of(arguments.plants, tasks)
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.experiments)
@@ -176,12 +179,12 @@ def run_transfer(arguments: argparse.Namespace) -> int:
     return Exit.OK
 
 
-def _varied(level: str) -> str:
-    """Return a level's name with every switch that changes something."""
+def _varied(level: str, switches: Sequence[str]) -> str:
+    """Return a level's name with those of these switches that change something."""
     from shearline.evaluator.keylock_variation import level as check  # noqa: PLC0415
 
     name = level
-    for switch in VARIATION:
+    for switch in switches:
         try:
             check(f"{name}+{switch}")
         except ConfigError:

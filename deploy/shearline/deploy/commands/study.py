@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from shearline.deploy.commands import claims, section5, switches
 from shearline.deploy.exits import Exit
-from shearline.deploy.options import Subparsers, add_json, at_least, positive
+from shearline.deploy.options import Subparsers, add_json, add_plant, at_least, positive
 from shearline.protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -96,6 +96,7 @@ def _register_lock(kinds: Subparsers) -> None:
     lock.add_argument("--experiments", type=positive, default=5, metavar="M")
     lock.add_argument("--first-seed", type=at_least(0), default=0, metavar="S")
     lock.add_argument("--fresh", type=positive, default=100, metavar="N", help="default 100")
+    add_plant(lock)
     lock.add_argument("--workers", type=positive, default=2, metavar="W", help="evaluators")
     lock.add_argument(
         "--out",
@@ -233,6 +234,7 @@ def run_lock(arguments: argparse.Namespace) -> int:
         range(first, first + arguments.experiments),
         evaluators=arguments.workers,
         fresh=arguments.fresh,
+        plant=arguments.plant,
         folder=arguments.out or Path("runs", time.strftime("lock-%Y%m%d-%H%M%S")),
     ):
         done.append(one)

@@ -18,7 +18,8 @@ import numpy as np
 from shearline.evaluator.keylock import KeylockTask
 from shearline.evaluator.keylock_draw import draw_setup
 from shearline.evaluator.keylock_variation import level
-from shearline.evaluator.skill.execute import execute_compiled, noise_of, run_ticks
+from shearline.evaluator.skill.execute import noise_of
+from shearline.evaluator.skill.loop import execute_compiled, run_ticks
 from shearline.evaluator.skill.semantic import OPEN, beginning
 from shearline.evaluator.skill.skill import empty_state
 from shearline.evaluator.skill.trace import COLUMNS
