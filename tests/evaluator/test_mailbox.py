@@ -43,6 +43,7 @@ from shearline.evaluator.mailbox import (
     FINISH_S,
     HANG_S,
     HELD_MAX,
+    IDLE_LEASES,
     LEAVE_S,
     RESEND_S_MAX,
     RESEND_S_MIN,
@@ -88,7 +89,8 @@ def test_a_cold_worker_has_no_credit_and_a_warm_one_says_so() -> None:
 
 def test_credits_are_numbered_upwards_and_repeated_while_idle() -> None:
     box = joined()
-    credits_ = said((i for _, i in drive(box, 5.0)), Credit)
+    idle_s = IDLE_LEASES * LEASE_S
+    credits_ = said((i for _, i in drive(box, 5.5 * idle_s)), Credit)
     assert len(credits_) >= 4
     assert [c.seq for c in credits_] == sorted({c.seq for c in credits_})
 

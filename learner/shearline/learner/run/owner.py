@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import gc
 import logging
-import math
 import time
 from collections import Counter, deque
 from collections.abc import Callable
@@ -31,6 +30,7 @@ from shearline.learner.dispatcher.instructions import (
 from shearline.learner.dispatcher.states import RunState
 from shearline.learner.dispatcher.status import Vitals
 from shearline.learner.run.config import RunConfig
+from shearline.learner.run.effort import Effort
 from shearline.learner.run.fitter import Fitter, Modelled, Recommended
 from shearline.learner.run.inbox import Inbox
 from shearline.learner.run.incoming import Incoming
@@ -130,7 +130,7 @@ class Owner:
             RecordError: If the journal cannot be written; nothing unwritten was told to anyone.
         """
         while not self._is_over():
-            began_cpu_s = time.thread_time()
+            effort = Effort()
             items = self._left or self._inbox.take()
             began_s, self._left = time.perf_counter(), []
             out: list[Instruction] = []
@@ -140,24 +140,24 @@ class Owner:
                 event = self._event(item)
                 if event is not None:
                     out += self.dispatcher.handle(event, self._now_s())
-                if time.thread_time() - began_cpu_s > STEP_DECIDES_S:
+                if effort.exceeds(STEP_DECIDES_S):
                     self._left = items[number:]
                     break
             if self._now_s() >= self._next_tick_s:
                 # Who is woken just before the time need not wait for the next waking.
                 self._next_tick_s = self._now_s() + 0.9 * self.tick_s
                 out += self.dispatcher.handle(Tick(), self._now_s())
+                self.dispatcher.desk.is_observed = self._outgoing.is_observed()
             self._carry_out(out)
-            self._tell(began_cpu_s + STEP_TELLS_S)
-            self.dispatcher.desk.is_observed = self._outgoing.is_observed()
+            self._tell(effort)
             if self._now_s() >= self._next_status_s:
                 self._show()
-            cpu_s = time.thread_time() - began_cpu_s
+            cpu_s = effort.cpu_s()
             self._pulse.step(time.perf_counter() - began_s, cpu_s)
             if cpu_s > STEP_CPU_S_MAX:
                 kinds = Counter(type(item).__name__ for item in items)
                 _log.warning("a step took %.0f ms of processor time: %s", 1e3 * cpu_s, dict(kinds))
-        self._tell(math.inf)
+        self._tell()
         self._show()
         vitals = self.vitals()
         _log.info(
@@ -224,10 +224,12 @@ class Owner:
             else:
                 self._effect(instruction)
 
-    def _tell(self, until_cpu_s: float) -> None:
+    def _tell(self, effort: Effort | None = None) -> None:
         """Let observers and the log know, in order; no further once the step has cost enough."""
         told = 0
-        while self._news and (told < TELLS_MIN or time.thread_time() < until_cpu_s):
+        while self._news and (
+            told < TELLS_MIN or effort is None or not effort.exceeds(STEP_TELLS_S)
+        ):
             self._effect(self._news.popleft())
             told += 1
 
@@ -252,14 +254,12 @@ class Owner:
                 self._fitter.finish(tells)
 
     def _show(self) -> None:
-        now_s = self._now_s()
-        self._next_status_s = now_s + STATUS_EVERY_S
-        shown = status(
-            self.dispatcher,
-            run=self.name,
-            learner=self.config.learner,
-            vitals=self.vitals(),
-        )
+        """Let everyone know how the run stands, if there is anyone."""
+        self._next_status_s = self._now_s() + STATUS_EVERY_S
+        vitals = self.vitals()
+        if self._on_status is None and not self.dispatcher.desk.is_observed:
+            return
+        shown = status(self.dispatcher, run=self.name, learner=self.config.learner, vitals=vitals)
         self._outgoing.publish(shown)
         if self._on_status is not None:
             self._on_status(shown)
