@@ -275,10 +275,12 @@ def test_the_end_of_an_old_epoch_that_is_seen_late_changes_nothing() -> None:
 
 def test_a_learner_that_says_nothing_for_long_is_greeted_again() -> None:
     box = joined()
-    greeted_s = [now_s for now_s, i in drive(box, 10.0) if said([i], Hello)]
-    assert greeted_s[0] == pytest.approx(SILENCE_LEASES * LEASE_S, abs=1e-3)
-    box.handle(Heard(Command(kind=CommandKind.RESUME)), 10.0)
-    assert not said((i for _, i in drive(box, 10.0 + LEASE_S, 10.0)), Hello)
+    silent_s = SILENCE_LEASES * LEASE_S
+    late_s = 2 * silent_s
+    greeted_s = [now_s for now_s, i in drive(box, late_s) if said([i], Hello)]
+    assert greeted_s[0] == pytest.approx(silent_s, abs=1e-3)
+    box.handle(Heard(Command(kind=CommandKind.RESUME)), late_s)
+    assert not said((i for _, i in drive(box, late_s + LEASE_S, late_s)), Hello)
 
 
 # -- leaving -------------------------------------------------------------------------------------

@@ -57,8 +57,10 @@ RESEND_S_MAX = 1.0
 RENEW_LEASES = 0.25
 IDLE_LEASES = 1.5
 
-#: Leases of silence after which a learner is asked whether it still knows us.
-SILENCE_LEASES = 3.0
+#: Leases of silence after which a learner is asked whether it still knows us. It seldom matters: a
+#: learner that started again is another life, which is greeted at once, and one that took us for
+#: gone hears the next credit.
+SILENCE_LEASES = 10.0
 
 #: How long what runs may finish once the learner ends the run, and how long leaving may take [s].
 FINISH_S = 2.0
