@@ -43,6 +43,7 @@ from shearline.evaluator.mailbox import (
     FINISH_S,
     HANG_S,
     HELD_MAX,
+    IDLE_LEASES,
     LEAVE_S,
     RESEND_S_MAX,
     RESEND_S_MIN,
@@ -88,7 +89,8 @@ def test_a_cold_worker_has_no_credit_and_a_warm_one_says_so() -> None:
 
 def test_credits_are_numbered_upwards_and_repeated_while_idle() -> None:
     box = joined()
-    credits_ = said((i for _, i in drive(box, 5.0)), Credit)
+    idle_s = IDLE_LEASES * LEASE_S
+    credits_ = said((i for _, i in drive(box, 5.5 * idle_s)), Credit)
     assert len(credits_) >= 4
     assert [c.seq for c in credits_] == sorted({c.seq for c in credits_})
 
@@ -273,10 +275,12 @@ def test_the_end_of_an_old_epoch_that_is_seen_late_changes_nothing() -> None:
 
 def test_a_learner_that_says_nothing_for_long_is_greeted_again() -> None:
     box = joined()
-    greeted_s = [now_s for now_s, i in drive(box, 10.0) if said([i], Hello)]
-    assert greeted_s[0] == pytest.approx(SILENCE_LEASES * LEASE_S, abs=1e-3)
-    box.handle(Heard(Command(kind=CommandKind.RESUME)), 10.0)
-    assert not said((i for _, i in drive(box, 10.0 + LEASE_S, 10.0)), Hello)
+    silent_s = SILENCE_LEASES * LEASE_S
+    late_s = 2 * silent_s
+    greeted_s = [now_s for now_s, i in drive(box, late_s) if said([i], Hello)]
+    assert greeted_s[0] == pytest.approx(silent_s, abs=1e-3)
+    box.handle(Heard(Command(kind=CommandKind.RESUME)), late_s)
+    assert not said((i for _, i in drive(box, late_s + LEASE_S, late_s)), Hello)
 
 
 # -- leaving -------------------------------------------------------------------------------------

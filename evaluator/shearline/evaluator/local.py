@@ -64,12 +64,13 @@ def run_trial(
         beat: Handed to the task; what it raises ends the trial as aborted.
         space: The task's, if it is at hand: to make one takes longer than a short trial.
     """
-    why = objection(Space(task.spec.space) if space is None else space, theta)
+    values = np.asarray(theta, dtype=np.float64)
+    why = objection(Space(task.spec.space) if space is None else space, values)
     if why:
         return Verdict(OutcomeKind.REJECTED, why=why)
     start_s = time.perf_counter()
     try:
-        outcome = task.run(np.asarray(theta, dtype=np.float64), seed, beat)
+        outcome = task.run(values, seed, beat)
     except TrialAborted as aborted:
         return _aborted(str(aborted) or "aborted without a reason", start_s)
     except (Exception, SystemExit) as fault:  # noqa: BLE001 - an evaluator outlives its tasks

@@ -52,12 +52,15 @@ from shearline.protocol.messages import (
 RESEND_S_MIN = 0.25
 RESEND_S_MAX = 1.0
 
-#: Share of a lease between renewals while a trial runs, and between signs of life while idle.
+#: Leases between renewals while a trial runs, and between signs of life while idle: who holds
+#: nothing delays nothing, and hundreds that wait for an update must not keep a core busy.
 RENEW_LEASES = 0.25
-IDLE_LEASES = 0.5
+IDLE_LEASES = 1.5
 
-#: Leases of silence after which a learner is asked whether it still knows us.
-SILENCE_LEASES = 3.0
+#: Leases of silence after which a learner is asked whether it still knows us. It seldom matters: a
+#: learner that started again is another life, which is greeted at once, and one that took us for
+#: gone hears the next credit.
+SILENCE_LEASES = 10.0
 
 #: How long what runs may finish once the learner ends the run, and how long leaving may take [s].
 FINISH_S = 2.0
@@ -227,7 +230,7 @@ class Mailbox:
             case Command(kind=CommandKind.STOP, why=why):
                 self._leave(0, why or "the run has ended", now_s, finish=True)
             case Command(kind=kind):
-                self._open(kind is CommandKind.RESUME)
+                self._open(kind is CommandKind.RESUME, now_s)
             case _:
                 pass
 
@@ -237,7 +240,7 @@ class Mailbox:
             return
         self.welcomed, self.epoch, self.lease_s = True, message.epoch, message.lease_s
         self._hello_s = now_s + SILENCE_LEASES * self.lease_s
-        self._open(not message.held)
+        self._open(not message.held, now_s)
         if self.takes_task and not self._prepared:
             self._prepared = True
             self._out.append(Prepare(message.task))
@@ -246,10 +249,11 @@ class Mailbox:
             for unacked in self.unacked.values():
                 unacked.due_s, unacked.delay_s = now_s, RESEND_S_MIN
 
-    def _open(self, is_open: bool) -> None:  # noqa: FBT001 - it is what the method is about
+    def _open(self, is_open: bool, now_s: float) -> None:  # noqa: FBT001 - what it is about
         if is_open != self._is_open:
             self._is_open = is_open
             self._out.append(Gate(is_open))
+            self._renew_for_the_held(now_s)
 
     def _given(self, trial: Trial, now_s: float) -> None:
         """Take a trial once, however often it comes."""
@@ -261,6 +265,12 @@ class Mailbox:
         elif trial.token not in self.held and self._has_room():
             self.held[trial.token] = trial
             self._out.append(Run(trial))
+            self._renew_for_the_held(now_s)
+
+    def _renew_for_the_held(self, now_s: float) -> None:
+        """See that what waits behind a closed gate is renewed in time, for no trial loop will."""
+        if self.held and not self._is_open:
+            self._life_s = min(self._life_s, now_s + RENEW_LEASES * self.lease_s)
 
     def _has_room(self) -> bool:
         return self.warm and self.leaving is None and len(self.held) < HELD_MAX

@@ -8,6 +8,7 @@ import pytest
 from simulation.lab import LEASE_S, TASK, Lab, published, said, sent
 
 from shearline.learner.dispatcher import admission, roster
+from shearline.learner.dispatcher.rules import SILENCE_LEASES
 from shearline.protocol.messages import (
     Command,
     CommandKind,
@@ -200,7 +201,7 @@ def test_an_evaluator_that_was_gone_and_is_heard_again_is_handed_more() -> None:
 def test_an_evaluator_that_is_silent_is_handed_nothing_until_it_is_heard() -> None:
     lab = Lab()
     lab.hello("a")
-    lab.wait(2 * LEASE_S)
+    lab.wait((SILENCE_LEASES + 0.1) * LEASE_S)
     lab.propose()
     assert lab.holds("a") == []
     lab.renew("a")

@@ -7,7 +7,6 @@ messages pass a stopwatch.
 from __future__ import annotations
 
 import os
-import secrets
 import sys
 import tempfile
 import time
@@ -33,7 +32,7 @@ from shearline.learner.run.folder import Folder, logged_to
 from shearline.learner.run.inbox import Inbox
 from shearline.learner.run.outgoing import Outgoing
 from shearline.learner.run.owner import Owner
-from shearline.learner.run.serving import TOKEN_BYTES
+from shearline.learner.run.tokens import tokens
 from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.keys import Keys
 from shearline.protocol.link import Link, open_router
@@ -118,7 +117,7 @@ class TimedDispatcher(Dispatcher):
     """A dispatcher whose results pass a stopwatch."""
 
     def __init__(self, config: RunConfig, stopwatch: Stopwatch) -> None:
-        super().__init__(config.rules(), lambda: secrets.token_hex(TOKEN_BYTES))
+        super().__init__(config.rules(), tokens().__next__)
         self._stopwatch = stopwatch
 
     def handle(self, event: Event, now_s: float) -> list[Instruction]:

@@ -9,7 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from shearline.learner.dispatcher.rules import EVALUATORS_MAX, REST_S_MAX, SILENCE_LEASES
+from shearline.learner.dispatcher.rules import (
+    EVALUATORS_MAX,
+    REST_S_MAX,
+    SILENCE_LEASES,
+    SILENCE_LEASES_STRUCK,
+)
 from shearline.protocol.messages import Hello
 
 #: The kind of evaluator whose trials are never copied.
@@ -89,7 +94,7 @@ class Roster:
     """
 
     def __init__(self, lease_s: float) -> None:
-        self.silence_s = SILENCE_LEASES * lease_s
+        self._lease_s = lease_s
         self._by_name: dict[str, Evaluator] = {}
 
     def get(self, name: str) -> Evaluator | None:
@@ -108,8 +113,9 @@ class Roster:
 
     def is_heard(self, evaluator: Evaluator, now_s: float) -> bool:
         """Tell whether it gave a sign of life lately."""
+        leases = SILENCE_LEASES_STRUCK if evaluator.strikes else SILENCE_LEASES
         return not (evaluator.left or evaluator.gone) and (
-            now_s - evaluator.heard_s <= self.silence_s
+            now_s - evaluator.heard_s <= leases * self._lease_s
         )
 
     def is_ready(self, evaluator: Evaluator, now_s: float) -> bool:

@@ -18,8 +18,11 @@ ATTEMPTS_MAX = 64
 #: the way back (measured: reconnected within .4 s of the endpoint's return).
 REJOIN_LEASES = 2.0
 
-#: An evaluator unheard for so many leases is handed nothing; idle ones are heard twice a lease.
-SILENCE_LEASES = 1.5
+#: An evaluator unheard for so many leases is handed nothing: an idle one is heard every 1.5, and
+#: those that die are missed by their liveliness long before. One that has just let an attempt lapse
+#: is believed less.
+SILENCE_LEASES = 3.5
+SILENCE_LEASES_STRUCK = 1.5
 
 #: Longest rest of an evaluator whose attempts keep lapsing [s].
 REST_S_MAX = 60.0

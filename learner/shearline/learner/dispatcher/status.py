@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from shearline.learner.dispatcher.core import Dispatcher
-from shearline.learner.dispatcher.states import TrialState
 from shearline.protocol.messages import Status
 
 #: Episodes a status looks back on; keeps it far below what one message may hold.
@@ -35,9 +34,7 @@ def status(dispatcher: Dispatcher, *, run: str, learner: str, vitals: Vitals) ->
         vitals: What its shell measured.
     """
     desk, book = dispatcher.desk, dispatcher.book
-    rows = book.rows(len(book.episodes) - 1) if book.episodes else []
-    states = [row.state for row in rows]
-    pending, leased = states.count(TrialState.PENDING), states.count(TrialState.LEASED)
+    trials = len(book.episodes[-1]) if book.episodes else 0
     return Status(
         run=run,
         task=desk.rules.task.name,
@@ -48,9 +45,9 @@ def status(dispatcher: Dispatcher, *, run: str, learner: str, vitals: Vitals) ->
         episodes=desk.rules.episodes,
         trials_per_episode=desk.rules.trials,
         confirming=sum(trials for _, trials in desk.rules.confirming()),
-        pending=pending,
-        leased=leased,
-        done=len(states) - pending - leased,
+        pending=len(book.pending),
+        leased=book.unsettled - len(book.pending),
+        done=trials - book.unsettled,
         counted=book.tally.counted,
         lost=book.tally.lost,
         late=book.tally.late,

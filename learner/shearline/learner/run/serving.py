@@ -7,7 +7,6 @@ enqueue, and fits happen in the fitter's thread.
 from __future__ import annotations
 
 import logging
-import secrets
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -26,13 +25,11 @@ from shearline.learner.run.outgoing import Outgoing
 from shearline.learner.run.owner import Owner
 from shearline.learner.run.signals import signals_to
 from shearline.learner.run.summary import RunSummary, summarise
+from shearline.learner.run.tokens import tokens
 from shearline.protocol.keys import Keys
 from shearline.protocol.link import Link, open_router
 from shearline.protocol.messages import Status
 from shearline.protocol.switching import quick_switching
-
-#: 128 random bits: nobody guesses the token of an attempt that was not given to them.
-TOKEN_BYTES = 16
 
 _log = logging.getLogger("shearline.learner")
 
@@ -76,7 +73,7 @@ def serve(
     with Folder(run_dir, config, resume=resume) as folder, logged_to(run_dir / "learner.log"):
         if folder.damage():
             _log.warning("%s", folder.damage())
-        dispatcher = Dispatcher(config.rules(), lambda: secrets.token_hex(TOKEN_BYTES), folder.book)
+        dispatcher = Dispatcher(config.rules(), tokens().__next__, folder.book)
         with open_router(listen, settings=settings) as link:
             if settings and "connect/endpoints" in settings:
                 refuse_namesake(link, keys)
