@@ -52,8 +52,8 @@ class BulletSettings:
     """
 
     substeps: int = 1
-    iterations: int = 100
-    residual: float = 1e-9
+    iterations: int = 50
+    residual: float = 1e-8
     stiffness: float = 1e7
     damping: float = 1e4
     near: float = 1e-3
@@ -98,19 +98,7 @@ class BulletWorld:
             q: Joint angles of the arm ``(7,)`` [rad].
         """
         b, client = self._bullet, self._client
-        b.resetSimulation(physicsClientId=client)
-        b.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
-        b.setPhysicsEngineParameter(
-            fixedTimeStep=self._settings.timestep_s,
-            numSolverIterations=self._settings.iterations,
-            solverResidualThreshold=self._settings.residual,
-            contactBreakingThreshold=self._settings.near,
-            contactSlop=0.0,
-            enableConeFriction=1,
-            deterministicOverlappingPairs=1,
-            enableFileCaching=0,
-            physicsClientId=client,
-        )
+        empty(b, client, self._settings)
         w, x, y, z = quaternion(lock.rotation).tolist()
         with tempfile.TemporaryDirectory(prefix="shearline-") as folder:
             for name, text in self.files.items():
@@ -218,6 +206,23 @@ class BulletWorld:
                 physicsClientId=client,
                 **surface,
             )
+
+
+def empty(library: Any, client: int, settings: BulletSettings) -> None:
+    """Throw away what is in a world, and say how it is to be solved."""
+    library.resetSimulation(physicsClientId=client)
+    library.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
+    library.setPhysicsEngineParameter(
+        fixedTimeStep=settings.timestep_s,
+        numSolverIterations=settings.iterations,
+        solverResidualThreshold=settings.residual,
+        contactBreakingThreshold=settings.near,
+        contactSlop=0.0,
+        enableConeFriction=1,
+        deterministicOverlappingPairs=1,
+        enableFileCaching=0,
+        physicsClientId=client,
+    )
 
 
 @cache

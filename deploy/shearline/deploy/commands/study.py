@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shearline.deploy.commands import claims, section5, switches
+from shearline.deploy.commands import agreement, claims, section5, switches
 from shearline.deploy.exits import Exit
 from shearline.deploy.options import Subparsers, add_json, add_plant, at_least, positive
 from shearline.protocol.errors import ConfigError
@@ -36,6 +36,7 @@ def register(commands: Subparsers) -> None:
     _register_fig4(kinds)
     _register_lock(kinds)
     section5.register(kinds)
+    agreement.register(kinds)
     claims.register(kinds)
     switches.register(kinds)
 
