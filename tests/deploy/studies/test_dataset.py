@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +16,13 @@ from shearline.deploy.cli import main
 from shearline.deploy.exits import Exit
 from shearline.deploy.studies.contenders import CONTENDERS, contender
 from shearline.deploy.studies.dataset import CODE, Gathering, Size, Wanted
-from shearline.deploy.studies.lanes import Effort, is_complete
+from shearline.deploy.studies.lanes import Effort, Lanes, is_complete
+from shearline.deploy.studies.trials_of import ran
 from shearline.evaluator.builtin import builtin_spec
 from shearline.learner.registry import create
+from shearline.learner.run.config import to_toml
 from shearline.protocol.errors import ConfigError, RecordError
+from shearline.protocol.messages import Purpose
 from shearline.protocol.space import Space
 from shearline.studies.experiment import SPREADS
 
@@ -77,7 +84,7 @@ def test_a_summary_that_cannot_be_read_is_said(tmp_path: Path) -> None:
 
 
 def test_the_ratio_takes_the_lesser_account_of_the_trials() -> None:
-    effort = Effort(runs=3, wall_s=60.0, evaluators_cpu_s=100.0, lanes=2)
+    effort = Effort(runs=3, wall_s=60.0, evaluators_cpu_s=100.0, cpu_s=108.0, lanes=2)
     assert effort.ratio(110.0) == pytest.approx(1.2)
     assert effort.ratio(96.0) == pytest.approx(1.25)
 
@@ -103,6 +110,46 @@ def test_experiments_are_run_once_and_the_same_alone_or_side_by_side(tmp_path: P
 
 
 @pytest.mark.slow
+def test_a_study_that_was_interrupted_goes_on_where_it_was(tmp_path: Path) -> None:
+    asked = [sys.executable, "-m", "shearline.deploy", "study", "table2", "--level", "sleep-20"]
+    asked += ["--learners", "random", "--experiments", "2", "--episodes", "2", "--trials", "20"]
+    asked += ["--fresh", "20", "--workers", "1", "--no-picture", "--json", "--out", str(tmp_path)]
+    with subprocess.Popen(asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as study:
+        journals = tmp_path.glob("runs/*/*-00-*/journal")
+        while not any(journal.stat().st_size > 4000 for journal in journals):
+            assert study.poll() is None
+            journals = tmp_path.glob("runs/*/*-00-*/journal")
+        study.send_signal(signal.SIGINT)
+        assert study.wait(30) == Exit.INTERRUPTED
+    done = json.loads(subprocess.run(asked, check=True, capture_output=True).stdout)
+    assert [len(one["learned"]["cost"]) for one in done["experiments"]] == [40, 40]
+    assert all(one["fresh"]["success"] for one in done["experiments"])
+
+
+@pytest.mark.slow
+def test_a_learner_and_an_evaluator_that_are_killed_are_started_again(tmp_path: Path) -> None:
+    one = replace(wanted(size=replace(SIZE, trials=20)), task="sleep-20")
+    folder = one.folder(tmp_path, one.learning())
+    lanes = Lanes(tmp_path, [folder], 1, "mujoco", lambda _: None)
+    folder.mkdir(parents=True)
+    (folder / "run.toml").write_text(to_toml(one.learning()))
+    killed = threading.Thread(target=kill_both, args=(lanes, folder))
+    killed.start()
+    assert lanes.run().runs == 1
+    killed.join()
+    assert ran(folder).outcomes(Purpose.LEARNING).trials == 40
+
+
+def kill_both(lanes: Lanes, folder: Path) -> None:
+    """Kill learner and evaluator of the only lane once trials are being run."""
+    journal = folder / "journal"
+    while not (journal.exists() and journal.stat().st_size > 4000):
+        pass
+    for child in list(lanes.children()):
+        child.process.kill()
+
+
+@pytest.mark.slow
 def test_results_of_other_code_are_said_and_renewed_when_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -123,10 +170,10 @@ def test_studies_share_their_runs_and_print_data_for_programs(
 ) -> None:
     asked = ["--level", "sleep-0", "--learners", "random", "centre-push", "--experiments", "2"]
     asked += ["--episodes", "2", "--trials", "5", "--fresh", "4", "--around", "2", "--json"]
-    for name, ran in {"reliability": 2, "table1": 0, "table2": 0}.items():
+    for name, stretches in {"reliability": 2, "table1": 0, "table2": 0}.items():
         assert main(["study", name, *asked, "--no-picture", "--out", str(tmp_path)]) == Exit.OK
         data = json.loads(capsys.readouterr().out)
-        assert len(data["efforts"]) == ran
+        assert len(data["efforts"]) == stretches
         assert [one["contender"] for one in data["curves"]] == ["random", "centre-push"]
         assert data["tables"][0]["rows"][1][0] == "centre-push"
 

@@ -233,9 +233,11 @@ def _finish(
         lines = tabular.markdown(head, rows) if arguments.markdown else tabular.aligned(head, rows)
         print("\n".join(["", *lines]))
     for effort in efforts:
+        beside = effort["cpu_s"] / effort["evaluators_cpu_s"] - 1.0
         print(
             f"{effort['runs']} runs took {effort['wall_s']:.0f} s, {effort['ratio']:.2f} times the"
-            f" least that {effort['lanes']} evaluators need for their trials"
+            f" least that {effort['lanes']} evaluators need for their trials;"
+            f" {effort['cpu_s']:.0f} s of processor time, {100 * beside:.0f} % more than theirs"
         )
     for path in pictures:
         print(f"drawn: {path}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -37,12 +38,14 @@ class Effort:
         runs: Runs led.
         wall_s: From the first process started to the last run complete [s].
         evaluators_cpu_s: Processor time of all evaluators, trials for the most part [s].
+        cpu_s: Processor time of all that was started, learners among it [s].
         lanes: Evaluators at work at once.
     """
 
     runs: int
     wall_s: float
     evaluators_cpu_s: float
+    cpu_s: float
     lanes: int
 
     def ratio(self, trials_s: float) -> float:
@@ -109,7 +112,7 @@ class Lanes:
             RunFailed: If a run fails, or processes keep dying.
             KeyboardInterrupt: If it was interrupted; runs were stopped in order and go on later.
         """
-        began_s, waiting = time.monotonic(), deque(self.folders)
+        began_s, began_cpu_s, waiting = time.monotonic(), _ended_cpu_s(), deque(self.folders)
         (self.study / LOGS).mkdir(parents=True, exist_ok=True)
         count = min(self.workers, len(self.folders))
         self._lanes = [_Lane(number, free_endpoint()) for number in range(count)]
@@ -118,10 +121,17 @@ class Lanes:
                 for lane in self._lanes:
                     self._look_after(lane, waiting)
                 time.sleep(LOOK_S / 4)
-            cpu_s = sum(_cpu_s(lane.evaluator) for lane in self._lanes)
+            wall_s = time.monotonic() - began_s
+            evaluators_cpu_s = sum(_cpu_s(lane.evaluator) for lane in self._lanes)
         finally:
-            processes.end(self._children(), patience_s=PATIENCE_S)
-        return Effort(len(self.folders), time.monotonic() - began_s, cpu_s, count)
+            processes.end(self.children(), patience_s=PATIENCE_S)
+        cpu_s = _ended_cpu_s() - began_cpu_s
+        return Effort(len(self.folders), wall_s, evaluators_cpu_s, cpu_s, count)
+
+    def children(self) -> Iterable[Child]:
+        """Yield the processes of all lanes."""
+        for lane in self._lanes:
+            yield from (one for one in (lane.learner, lane.evaluator) if one is not None)
 
     def _look_after(self, lane: _Lane, waiting: deque[Path]) -> None:
         """Keep the evaluator alive, and lead the next run once one is complete."""
@@ -143,10 +153,6 @@ class Lanes:
         seen = [] if self.traces else ["--no-traces"]
         log = self.study / LOGS / f"{name}.out"
         return spawn_command(name, ["evaluator", *arguments, "--forever", *seen], log)
-
-    def _children(self) -> Iterable[Child]:
-        for lane in self._lanes:
-            yield from (one for one in (lane.learner, lane.evaluator) if one is not None)
 
 
 def _learner(lane: _Lane, folder: Path) -> Child:
@@ -171,6 +177,12 @@ def _fell(child: Child, lane: _Lane) -> bool:
         words = child.last_words().removeprefix("shearline: ")
         raise RunFailed(f"{child.name} ended: {words or 'without a word'} (see {child.log})")
     return True
+
+
+def _ended_cpu_s() -> float:
+    """Return the processor time of all children that have ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def _cpu_s(child: Child | None) -> float:
