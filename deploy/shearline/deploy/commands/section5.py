@@ -124,7 +124,7 @@ def _add_common(kind: argparse.ArgumentParser) -> None:
         metavar="N",
         help="draws of each spread around a recommendation, default 25",
     )
-    kind.add_argument("--record", action="store_true", help="write a record of every run as well")
+    kind.add_argument("--record", action="store_true", help="write a record of every run, too")
     kind.add_argument(
         "--renew", action="store_true", help="run again what was made by other code of a learner"
     )
@@ -143,11 +143,9 @@ def run(name: str, arguments: argparse.Namespace) -> int:
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.experiments)
     gathering, size = _gathering(arguments), _size(arguments)
     wanted = [
-        Wanted(who, arguments.level, arguments.plant, seed, size, arguments.record)
-        for who in asked
-        for seed in seeds
+        Wanted(who, arguments.level, arguments.plant, seed, size) for who in asked for seed in seeds
     ]
-    found = gathering.experiments(wanted, tried=study.tried, renew=arguments.renew)
+    found = gathering.experiments(wanted, tried=study.tried)
     make: Sequence[Callable[[list[Experiment]], Table]]
     make = [getattr(section5, table) for table in study.tables]
     pictures = []
@@ -202,7 +200,13 @@ def _size(arguments: argparse.Namespace) -> Size:
 def _gathering(arguments: argparse.Namespace) -> Gathering:
     from shearline.deploy.studies.dataset import Gathering  # noqa: PLC0415 - loads zenoh
 
-    return Gathering(arguments.out, arguments.workers, quiet=arguments.json)
+    return Gathering(
+        study=arguments.out,
+        workers=arguments.workers,
+        quiet=arguments.json,
+        record=arguments.record,
+        renew=arguments.renew,
+    )
 
 
 def _plain(found: object) -> Any:

@@ -16,6 +16,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import msgspec
+
 from shearline.deploy.studies.contenders import Contender
 from shearline.deploy.studies.lanes import Effort, Lanes, is_complete
 from shearline.deploy.studies.trials_of import outcomes, ran
@@ -62,7 +64,6 @@ class Wanted:
     plant: str
     seed: int
     size: Size
-    record: bool = False
 
     def learning(self) -> RunConfig:
         """Return the run that learns, and then tries what is recommended."""
@@ -78,7 +79,6 @@ class Wanted:
             seed=self.seed,
             confirm=self.size.fresh,
             speculative=False,
-            record=self.record,
         )
 
     def trying(self, found: Experiment) -> RunConfig:
@@ -87,16 +87,14 @@ class Wanted:
         around = draws_around(plain.space, found.recommended, self.size.around, self.seed)
         again = [found.cheapest] * self.size.fresh if found.cheapest else []
         tuples = [*(one.tolist() for one in around), *again]
-        return planned(self.task, tuples, FRESH_SEED + self.seed, record=self.record)
+        return planned(self.task, tuples, FRESH_SEED + self.seed)
 
     def folder(self, study: Path, config: RunConfig, what: str = "") -> Path:
         """Return where a run of this experiment is kept."""
         return folder_of(study, config, self.plant, f"{self.contender.name}-{self.seed:02d}{what}")
 
 
-def planned(
-    task: str, tuples: Sequence[Sequence[float]], seed: int, *, record: bool = False
-) -> RunConfig:
+def planned(task: str, tuples: Sequence[Sequence[float]], seed: int) -> RunConfig:
     """Return a run that tries the given tuples, each once and on noise of its own."""
     return RunConfig(
         task=builtin_spec(task),
@@ -106,7 +104,6 @@ def planned(
         trials=len(tuples),
         seed=seed,
         speculative=False,
-        record=record,
     )
 
 
@@ -125,14 +122,16 @@ class Gathering:
         study: The study's folder.
         workers: Runs led at once.
         quiet: Whether to keep progress to itself.
-        traces: Whether trials send traces to their records.
+        record: Whether runs write a record beside their journal, without traces.
+        renew: Run again what was made by other code of the same learner.
         efforts: What every stretch of running took, so far.
     """
 
     study: Path
     workers: int
     quiet: bool = False
-    traces: bool = False
+    record: bool = False
+    renew: bool = False
     efforts: list[tuple[Effort, float]] = field(default_factory=list)
 
     def lead(self, plant: str, runs: Iterable[tuple[Path, RunConfig]]) -> None:
@@ -147,22 +146,18 @@ class Gathering:
         if not missing:
             return
         for folder, config in missing:
-            _write_down(folder, config)
+            _write_down(folder, msgspec.structs.replace(config, record=self.record))
         folders = [folder for folder, _ in missing]
         tell = _Progress(len(folders), quiet=self.quiet)
-        lanes = Lanes(self.study, folders, self.workers, plant, tell.done, traces=self.traces)
-        effort = lanes.run()
+        effort = Lanes(self.study, folders, self.workers, plant, tell.done).run()
         self.efforts.append((effort, sum(ran(folder).trials_s for folder in folders)))
 
-    def experiments(
-        self, wanted: Sequence[Wanted], *, tried: bool = False, renew: bool = False
-    ) -> list[Experiment]:
+    def experiments(self, wanted: Sequence[Wanted], *, tried: bool = False) -> list[Experiment]:
         """Return the experiments, running what is missing.
 
         Args:
             wanted: In the order in which they are run, all on one plant.
             tried: Whether the cheapest tuple and draws around the recommendation are tried too.
-            renew: Run again what was made by other code of the same learner.
 
         Raises:
             RunFailed: If a run fails.
@@ -171,7 +166,7 @@ class Gathering:
         """
         plant = wanted[0].plant
         learning = [(one.folder(self.study, c := one.learning()), c) for one in wanted]
-        _heed_code([folder for folder, _ in learning], wanted, renew=renew)
+        _heed_code([folder for folder, _ in learning], wanted, renew=self.renew)
         self.lead(plant, learning)
         found = [_learned(one, folder) for one, (folder, _) in zip(wanted, learning, strict=True)]
         if not tried:
@@ -239,8 +234,6 @@ def _learned(one: Wanted, folder: Path) -> Experiment:
 
 def _tried(found: Experiment, folder: Path, size: Size) -> Experiment:
     """Add what was tried around a recommendation, and of the cheapest tuple."""
-    import msgspec  # noqa: PLC0415 - for one call
-
     trials = ran(folder)
     kinds: list[list[int]] = [[] for _ in SPREADS]
     again: list[int] = []

@@ -94,7 +94,6 @@ class Lanes:
         workers: Lanes.
         plant: What evaluators act on.
         on_done: Called with each run's folder as it is complete.
-        traces: Whether trials send traces to the record.
     """
 
     study: Path
@@ -102,7 +101,6 @@ class Lanes:
     workers: int
     plant: str
     on_done: Callable[[Path], None]
-    traces: bool = False
     _lanes: list[_Lane] = field(default_factory=list, init=False)
 
     def run(self) -> Effort:
@@ -150,9 +148,8 @@ class Lanes:
     def _evaluator(self, lane: _Lane) -> Child:
         name = f"evaluator-{lane.number}"
         arguments = ["--connect", reach(lane.listen), "--name", name, "--plant", self.plant]
-        seen = [] if self.traces else ["--no-traces"]
         log = self.study / LOGS / f"{name}.out"
-        return spawn_command(name, ["evaluator", *arguments, "--forever", *seen], log)
+        return spawn_command(name, ["evaluator", *arguments, "--forever", "--no-traces"], log)
 
 
 def _learner(lane: _Lane, folder: Path) -> Child:
