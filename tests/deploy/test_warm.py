@@ -12,7 +12,7 @@ from shearline.deploy.cli import main
 from shearline.deploy.exits import Exit
 from shearline.deploy.warm import prior_of
 from shearline.evaluator.builtin import builtin_spec
-from shearline.learner.run.config import RunConfig, difference, from_toml, to_toml
+from shearline.learner.run.config import RunConfig, checked, difference, from_toml, to_toml
 from shearline.protocol.errors import ConfigError
 
 SPEC = builtin_spec("sleep-0")
@@ -68,6 +68,21 @@ def test_where_there_is_no_run_there_is_nothing_to_start_from(
 def test_a_learner_that_cannot_is_refused_before_anything_is_read() -> None:
     with pytest.raises(ConfigError, match="hireps cannot start"):
         prior_of(Path("nowhere"), SPEC, "hireps")
+
+
+@pytest.mark.parametrize(
+    ("theta", "cost", "why"),
+    [
+        ([[0.1, 0.2]], [], "got 1 tuples, 0 costs, 1 successes"),
+        ([[0.1]], [1.0], "tuples of 2 values"),
+    ],
+)
+def test_a_start_that_was_written_by_hand_must_add_up(
+    theta: list[list[float]], cost: list[float], why: str
+) -> None:
+    start = {"run": "other", "theta": theta, "cost": cost, "success": [True]}
+    with pytest.raises(ConfigError, match=why):
+        checked({"task": msgspec.to_builtins(SPEC), "warm_start": start})
 
 
 def test_a_start_is_part_of_a_run_and_survives_its_file() -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import msgspec
-
 from shearline.learner.prior import Prior
 from shearline.learner.registry import PRIMED, resolve
 from shearline.protocol.errors import ConfigError
@@ -29,13 +27,14 @@ def prior_of(run_dir: Path, task: TaskSpec, learner: str) -> Prior:
         RecordError: If the run cannot be read.
     """
     from shearline.deploy.opened import opened  # noqa: PLC0415 - loads the formats of records
+    from shearline.deploy.replay.recorded import Recorded  # noqa: PLC0415 - as above
 
     if resolve(learner) not in PRIMED:
         raise ConfigError(
             f"{learner} cannot start from another run: choose one of {', '.join(sorted(PRIMED))}"
         )
     run = opened(run_dir)
-    other = msgspec.convert(run.settings()["task"], TaskSpec)
+    other = Recorded(run).spec
     if list(other.space.items()) != list(task.space.items()):
         raise ConfigError(
             f"{run_dir} learned {other.name} with {_differing(other, task)}: a run starts from"

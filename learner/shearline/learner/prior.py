@@ -28,6 +28,13 @@ class Prior(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     cost: list[float] = []
     success: list[bool] = []
 
+    def __post_init__(self) -> None:
+        if not len(self.theta) == len(self.cost) == len(self.success):
+            raise ValueError(
+                f"a warm start needs a cost and a success for each tuple, got {len(self.theta)}"
+                f" tuples, {len(self.cost)} costs, {len(self.success)} successes"
+            )
+
     def __bool__(self) -> bool:
         return bool(self.theta)
 

@@ -142,7 +142,11 @@ def checked(values: dict[str, Any]) -> RunConfig:
         config = msgspec.convert(values, RunConfig)
     except msgspec.ValidationError as fault:
         raise ConfigError(f"this configuration cannot be run: {fault}") from None
-    Space(config.task.space)
+    space = Space(config.task.space)
+    if any(len(theta) != len(space) for theta in config.warm_start.theta):
+        raise ConfigError(
+            f"this configuration cannot be run: a warm start needs tuples of {len(space)} values"
+        )
     return config
 
 
