@@ -44,6 +44,7 @@ def draw_fig6(found: Sequence[Experiment], path: Path) -> None:
             axes.set_visible(False)
         for axes, curve in zip(panels.flat, curves, strict=False):
             _draw_costs(axes, curve)
+        panels[0, 0].legend(frameon=False, fontsize=7.0, loc="upper right")
         for row in panels:
             row[0].set_ylabel("cost [s]")
         for axes in panels[-1]:
@@ -55,11 +56,12 @@ def _draw_costs(axes: Any, curve: dict[str, Any]) -> None:
     trials = len(curve["mean_cost"])
     length = trials // len(curve["episode_cost"])
     number = np.arange(1, trials + 1)
-    axes.plot(number, curve["mean_cost"], color=SKY, linewidth=0.7)
+    axes.plot(number, curve["mean_cost"], color=SKY, linewidth=0.7, label="a trial, mean")
     edges = np.arange(0, trials + 1, length)
-    axes.stairs(curve["episode_cost"], edges, color=BLUE, linewidth=1.6, baseline=None)
+    whole = curve["episode_cost"]
+    axes.stairs(whole, edges, color=BLUE, linewidth=1.6, baseline=None, label="an episode, mean")
     best = [math.nan if value is None else value for value in curve["best_cost"]]
-    axes.plot(number, best, color=INK, linewidth=1.0, linestyle="--")
+    axes.plot(number, best, color=INK, linewidth=1.0, linestyle="--", label="best so far, mean")
     axes.set(xlim=(0, trials), ylim=(0.0, 15.0))
     axes.set_title(f"{curve['contender']} ({curve['experiments']})")
 

@@ -124,7 +124,7 @@ def _add_common(kind: argparse.ArgumentParser) -> None:
         metavar="N",
         help="draws of each spread around a recommendation, default 25",
     )
-    kind.add_argument("--record", action="store_true", help="write a record of every run, too")
+    kind.add_argument("--no-record", action="store_true", help="write journals only")
     kind.add_argument(
         "--renew", action="store_true", help="run again what was made by other code of a learner"
     )
@@ -204,7 +204,7 @@ def _gathering(arguments: argparse.Namespace) -> Gathering:
         study=arguments.out,
         workers=arguments.workers,
         quiet=arguments.json,
-        record=arguments.record,
+        record=not arguments.no_record,
         renew=arguments.renew,
     )
 
