@@ -26,6 +26,8 @@ from shearline.learner.run.folder import SUMMARY
 from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import RecordError
 
+#: How long learners whose runs are complete may take to complete their records [s].
+LEAVING_S = 20.0
 #: Where evaluators of a study write what they have to say.
 LOGS = "evaluators"
 
@@ -102,6 +104,7 @@ class Lanes:
     plant: str
     on_done: Callable[[Path], None]
     _lanes: list[_Lane] = field(default_factory=list, init=False)
+    _leaving: list[Child] = field(default_factory=list, init=False)
 
     def run(self) -> Effort:
         """Lead all runs to their ends and say what it took.
@@ -121,13 +124,15 @@ class Lanes:
                 time.sleep(LOOK_S / 4)
             wall_s = time.monotonic() - began_s
             evaluators_cpu_s = sum(_cpu_s(lane.evaluator) for lane in self._lanes)
+            processes.wait(self._leaving, patience_s=LEAVING_S)
         finally:
             processes.end(self.children(), patience_s=PATIENCE_S)
         cpu_s = _ended_cpu_s() - began_cpu_s
         return Effort(len(self.folders), wall_s, evaluators_cpu_s, cpu_s, count)
 
     def children(self) -> Iterable[Child]:
-        """Yield the processes of all lanes."""
+        """Yield the processes of all lanes, and those that complete a record."""
+        yield from self._leaving
         for lane in self._lanes:
             yield from (one for one in (lane.learner, lane.evaluator) if one is not None)
 
@@ -136,9 +141,11 @@ class Lanes:
         if lane.evaluator is None or _fell(lane.evaluator, lane):
             lane.evaluator = self._evaluator(lane)
         if lane.folder is not None and lane.learner is not None:
-            if lane.learner.returncode == Exit.OK and is_complete(lane.folder):
+            if is_complete(lane.folder):
+                # Its endpoint is free by then; the record may need a moment more.
+                self._leaving.append(lane.learner)
                 self.on_done(lane.folder)
-                lane.folder, lane.restarts = None, 0
+                lane.folder, lane.learner, lane.restarts = None, None, 0
             elif _fell(lane.learner, lane):
                 lane.learner = _learner(lane, lane.folder)
         if lane.folder is None and waiting:
