@@ -12,8 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shearline.evaluator.base import Outcome, TrialAborted
-from shearline.evaluator.keylock import KeylockTask, draw_setup
-from shearline.evaluator.keylock_spec import LEVELS, keylock_spec, level
+from shearline.evaluator.keylock import KeylockTask
+from shearline.evaluator.keylock_draw import draw_setup
+from shearline.evaluator.keylock_spec import keylock_spec
+from shearline.evaluator.keylock_variation import LEVELS, level
 from shearline.evaluator.skill.baselines import TUPLES, tuple_of
 from shearline.evaluator.skill.parameters import BOUNDS, space
 from shearline.protocol.errors import ConfigError
@@ -127,7 +129,7 @@ def test_another_seed_gives_another_trace(task: KeylockTask) -> None:
 def test_a_friction_of_one_trial_does_not_leak_into_the_next(task: KeylockTask) -> None:
     before = task.run(tuple_of(TUPLES["centre-push"]), 6, lambda: None).digest
     jam = KeylockTask("keylock-jam")
-    jam._plant = task.plant
+    jam.plant = task.plant
     jam.run(tuple_of(TUPLES["centre-push"]), 6, lambda: None)
     assert task.run(tuple_of(TUPLES["centre-push"]), 6, lambda: None).digest == before
 

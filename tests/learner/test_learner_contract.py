@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 
@@ -15,7 +16,7 @@ from shearline.learner import (
     UnknownLearnerError,
     create,
 )
-from shearline.learner.registry import LEARNERS
+from shearline.learner.registry import EXTRAS, LEARNERS
 from shearline.learner.testing import LearnerContract
 from shearline.protocol.errors import ConfigError
 
@@ -63,8 +64,13 @@ class TestLatinHypercube(Shipped):
     name = "lhs"
 
 
+@pytest.mark.skipif(find_spec("optuna") is None, reason="needs the extra 'tpe'")
+class TestTPE(Shipped):
+    name = "tpe"
+
+
 def test_every_name_is_held_to_the_contract() -> None:
-    assert {held.name for held in Shipped.__subclasses__()} == set(LEARNERS)
+    assert {held.name for held in Shipped.__subclasses__()} == {*LEARNERS, *EXTRAS}
 
 
 @pytest.mark.parametrize("name", LEARNERS)

@@ -9,6 +9,10 @@ from typing import TypeAlias
 # argparse gives what add_subparsers() returns no public name.
 Subparsers: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001
 
+#: What evaluators can act on, the usual one first; as in :mod:`shearline.evaluator.plants`, which
+#: is not loaded to parse arguments.
+PLANTS = ("mujoco", "pybullet")
+
 #: Where a learner listens when nobody says otherwise: this machine only.
 ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -66,6 +70,13 @@ def add_connect(command: argparse.ArgumentParser, *, patience_s: float = 5.0) ->
     )
 
 
+def add_plant(command: argparse.ArgumentParser) -> None:
+    """``--plant``: what evaluators act on."""
+    command.add_argument(
+        "--plant", choices=PLANTS, default=PLANTS[0], help=f"what to act on (default {PLANTS[0]})"
+    )
+
+
 def add_traces(command: argparse.ArgumentParser) -> None:
     """``--trace-hz`` and ``--no-traces``: what evaluators show of each trial."""
     command.add_argument(
@@ -88,9 +99,11 @@ def add_run(command: argparse.ArgumentParser) -> None:
     """Arguments that say what a run is; each overrides the TOML file, if one is given."""
     group = command.add_argument_group("the run")
     group.add_argument(
-        "--task", help="keylock, keylock-limit, keylock-jam, sphere, or file:function"
+        "--task",
+        help="keylock, keylock-limit, keylock-jam, with switches behind it or without"
+        " (keylock+grasp+noise), sphere, or file:function",
     )
-    learners = "psp-ranked (default), psp, psp-paper, hireps, cmaes, ga, pso, lhs, random"
+    learners = "psp-ranked (default), psp, psp-paper, hireps, cmaes, ga, pso, lhs, random, tpe"
     group.add_argument("--learner", help=learners)
     group.add_argument("--episodes", type=positive, metavar="K", help="updates (default 10)")
     group.add_argument("--trials", type=positive, metavar="N", help="per episode (default 20)")
@@ -106,6 +119,12 @@ def add_run(command: argparse.ArgumentParser) -> None:
         type=at_least(0),
         metavar="N",
         help="and N tuples drawn from the recommended region",
+    )
+    group.add_argument(
+        "--warm-start",
+        metavar="RUN",
+        help="start from the trials of another run on the same parameters; they fade by half"
+        " with every episode",
     )
     group.add_argument("--lease", type=seconds, metavar="S", help="lease of an attempt [s]")
     group.add_argument("--out", metavar="RUN_DIR", help="run folder (default runs/TASK-TIME)")
@@ -127,6 +146,7 @@ def run_arguments(arguments: argparse.Namespace) -> list[str]:
         "--seed": arguments.seed,
         "--confirm": arguments.confirm,
         "--confirm-region": arguments.confirm_region,
+        "--warm-start": arguments.warm_start,
         "--lease": arguments.lease,
     }
     words = [str(arguments.config)] if arguments.config is not None else []

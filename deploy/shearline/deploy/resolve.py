@@ -15,6 +15,7 @@ from typing import Any
 
 import msgspec
 
+from shearline.deploy.warm import prior_of
 from shearline.evaluator.tasks import load_task
 from shearline.learner.registry import resolve
 from shearline.learner.run.config import RunConfig, checked
@@ -76,6 +77,9 @@ def resolve_run(arguments: argparse.Namespace) -> Asked:
         raise ConfigError("nothing to learn was named: give --task keylock, or FILE:FUNCTION")
     config = checked(values)
     resolve(config.learner)
+    if arguments.warm_start is not None:
+        prior = prior_of(Path(arguments.warm_start), config.task, config.learner)
+        config = msgspec.structs.replace(config, warm_start=prior)
     typed = name if isinstance(name, str) else config.task.name
     return Asked(
         config=config,

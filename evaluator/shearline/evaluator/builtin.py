@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from shearline.evaluator.base import Array, Outcome, Task
+from shearline.evaluator.keylock_variation import LEVELS, is_keylock
+from shearline.evaluator.plants import DEFAULT
 from shearline.protocol.errors import ConfigError
 from shearline.protocol.task import TaskSpec
 
@@ -22,23 +24,26 @@ _NAP_S = 0.05
 _BENCHMARK_N = 20
 
 _BENCHMARKS = ("sphere", "rastrigin")
-_KEYLOCKS = ("keylock", "keylock-limit", "keylock-jam")
 _SLEEP = re.compile(r"sleep(?:-(\d{1,6}))?")
 
 
 def builtin_names() -> tuple[str, ...]:
-    """Return the names that :func:`builtin_task` knows."""
-    return (*_KEYLOCKS, *_BENCHMARKS, "sleep-MS")
+    """Return the names that :func:`builtin_task` knows; a level may have switches behind it."""
+    return (*LEVELS, *_BENCHMARKS, "sleep-MS")
 
 
-def builtin_task(name: str) -> Task:
+def builtin_task(name: str, plant: str = DEFAULT) -> Task:
     """Return a built-in task, not yet warm.
+
+    Args:
+        name: One of :func:`builtin_names`.
+        plant: What a task that has a plant acts on, one of :data:`~.plants.PLANTS`.
 
     Raises:
         ConfigError: If there is none of that name, or what it needs is not installed.
     """
-    if name in _KEYLOCKS:
-        return _keylock(name)
+    if is_keylock(name):
+        return _keylock(name, plant)
     if name in _BENCHMARKS:
         return _benchmark(name)
     sleep = _SLEEP.fullmatch(name)
@@ -56,7 +61,7 @@ def builtin_spec(name: str) -> TaskSpec:
     Raises:
         ConfigError: As :func:`builtin_task`.
     """
-    if name in _KEYLOCKS:
+    if is_keylock(name):
         from shearline.evaluator.keylock_spec import keylock_spec  # noqa: PLC0415 - see module
 
         return keylock_spec(name)
@@ -130,7 +135,7 @@ def _benchmark(name: str) -> Task:
     return BenchmarkTask(name)
 
 
-def _keylock(name: str) -> Task:
-    from shearline.evaluator.keylock import KeylockTask  # noqa: PLC0415 - see module
+def _keylock(name: str, plant: str) -> Task:
+    from shearline.evaluator import keylock  # noqa: PLC0415 - see module
 
-    return KeylockTask(name)
+    return keylock.BulletKeylockTask(name) if plant == "pybullet" else keylock.KeylockTask(name)

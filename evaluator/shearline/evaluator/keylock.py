@@ -6,20 +6,17 @@ whatever needs them first. Knows no learner and no wire.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
 from shearline.evaluator.base import Array, Outcome, TrialAborted
-from shearline.evaluator.keylock_spec import (
-    COST_PER_M,
-    ROI_M,
-    SKILL_VERSION,
-    Level,
-    keylock_spec,
-    level,
-)
+from shearline.evaluator.keylock_draw import draw_setup, scene_of
+from shearline.evaluator.keylock_spec import COST_PER_M, ROI_M, SKILL_VERSION, keylock_spec
+from shearline.evaluator.keylock_variation import level
 from shearline.evaluator.skill.parameters import parameters
 from shearline.protocol.pose import Placed
 from shearline.protocol.scene import SceneData
@@ -27,7 +24,8 @@ from shearline.protocol.task import TaskSpec
 
 if TYPE_CHECKING:
     from shearline.evaluator.skill.execute import Job
-    from shearline.evaluator.skill.semantic import Limits
+    from shearline.evaluator.skill.semantic import Decision, Limits
+    from shearline.sims.bullet_plant import BulletPlant
     from shearline.sims.mujoco_plant import MujocoPlant
     from shearline.sims.plant import Setup
     from shearline.sims.scene import Scene
@@ -36,17 +34,22 @@ if TYPE_CHECKING:
 _WARM_SEED = 0
 
 
-class KeylockTask:
-    """Insert a key into a lock that is not quite where it is believed to be.
+#: What can act on the lock.
+P = TypeVar("P", "MujocoPlant", "BulletPlant")
+
+
+class LockTask(ABC, Generic[P]):
+    """Insert a key into a lock that is not quite where it is believed to be, on some plant.
 
     Args:
-        name: Level: ``"keylock"``, ``"keylock-limit"`` or ``"keylock-jam"``.
-        scene: Scene to simulate; the default is the one all figures are measured with.
+        name: Level: ``"keylock"``, ``"keylock-limit"`` or ``"keylock-jam"``, with or without
+            switches behind it (:mod:`shearline.evaluator.keylock_variation`).
+        scene: Scene to simulate; the default is the level's own.
         extract: Whether each trial pulls the key out again after the verdict. Costs time and
             decides nothing in simulation, where each trial starts from a reset.
 
     Raises:
-        ConfigError: If there is no such level.
+        ConfigError: If there is no such level or switch.
     """
 
     def __init__(
@@ -56,8 +59,18 @@ class KeylockTask:
         self._level = level(name)
         self._scene = scene
         self._extract = extract
-        self._plant: MujocoPlant | None = None
         self._rows: Array | None = None
+
+    @cached_property
+    @abstractmethod
+    def plant(self) -> P:
+        """The simulation, built on first use."""
+
+    @abstractmethod
+    def execute(
+        self, setup: Setup, job: Job, beat: Callable[[], None], rows: Array | None = None
+    ) -> tuple[Decision, Array]:
+        """Run one trial on the plant; see :func:`shearline.evaluator.skill.execute.execute`."""
 
     @property
     def spec(self) -> TaskSpec:
@@ -68,15 +81,6 @@ class KeylockTask:
     def engine(self) -> str:
         """Engine, version, model hash and version of the skill; loads the engine."""
         return f"{self.plant.engine} skill {SKILL_VERSION}"
-
-    @property
-    def plant(self) -> MujocoPlant:
-        """The simulation, built on first use."""
-        if self._plant is None:
-            from shearline.sims.mujoco_plant import MujocoPlant  # noqa: PLC0415 - see module
-
-            self._plant = MujocoPlant(self._scene)
-        return self._plant
 
     def warm(self) -> None:
         """Load the engine, load or compile the loop, and run one trial."""
@@ -102,7 +106,7 @@ class KeylockTask:
             self._rows = np.empty((execute.TICKS_MAX, len(trace.COLUMNS)))
         job = self.job(theta)
         try:
-            end, rows = execute.execute_compiled(self.plant, setup, job, beat, self._rows)
+            end, rows = self.execute(setup, job, beat, self._rows)
         except PlantError as error:
             raise TrialAborted(str(error)) from error
         return Outcome(
@@ -155,30 +159,47 @@ class KeylockTask:
         )
 
 
+class KeylockTask(LockTask["MujocoPlant"]):
+    """The task in MuJoCo, the engine that all figures are measured with unless they say so."""
+
+    @cached_property
+    def plant(self) -> MujocoPlant:
+        """The simulation, built on first use."""
+        from shearline.sims.mujoco_plant import MujocoPlant  # noqa: PLC0415 - see module
+
+        return MujocoPlant(self._scene or scene_of(self._level))
+
+    def execute(
+        self, setup: Setup, job: Job, beat: Callable[[], None], rows: Array | None = None
+    ) -> tuple[Decision, Array]:
+        """Run one trial in a compiled loop."""
+        from shearline.evaluator.skill.loop import execute_compiled  # noqa: PLC0415 - see module
+
+        return execute_compiled(self.plant, setup, job, beat, rows)
+
+
+class BulletKeylockTask(LockTask["BulletPlant"]):
+    """The task in PyBullet."""
+
+    @cached_property
+    def plant(self) -> BulletPlant:
+        """The simulation, built on first use."""
+        from shearline.sims.bullet_plant import BulletPlant  # noqa: PLC0415 - see module
+
+        return BulletPlant(self._scene or scene_of(self._level))
+
+    def execute(
+        self, setup: Setup, job: Job, beat: Callable[[], None], rows: Array | None = None
+    ) -> tuple[Decision, Array]:
+        """Run one trial tick by tick."""
+        from shearline.evaluator.skill.execute import execute  # noqa: PLC0415 - see module
+
+        return execute(self.plant, setup, job, beat, rows)
+
+
 def _placed(setup: Setup) -> Placed:
     """Return where the lock stands in one trial."""
     from shearline.sims.scene import quaternion  # noqa: PLC0415
 
     w, x, y, z = quaternion(setup.lock.rotation).tolist()
     return Placed(body="lock", position=setup.lock.position.tolist(), quaternion=[x, y, z, w])
-
-
-def draw_setup(chosen: Level, seed: int) -> tuple[Setup, Array]:
-    """Draw what differs in the trial with this seed.
-
-    Returns:
-        The setup, and the lock's true pose off the believed one ``(6,)`` [m, rad].
-    """
-    from shearline.sims.lock import PINS  # noqa: PLC0415
-    from shearline.sims.plant import Setup  # noqa: PLC0415
-    from shearline.sims.scene import believed_lock_pose  # noqa: PLC0415
-
-    rng = np.random.default_rng(seed)
-    off = np.clip(rng.standard_normal(6), -2.0, 2.0)
-    off[:3] *= chosen.offset_m
-    off[3:] *= chosen.tilt_rad
-    friction = None if chosen.friction is None else float(rng.uniform(*chosen.friction))
-    spread = chosen.pin_spread
-    scale = tuple(float(f) for f in rng.uniform(1.0 - spread, 1.0 + spread, PINS))
-    pose = believed_lock_pose().moved(off[:3], off[3:])
-    return Setup(lock=pose, friction=friction, pin_scale=scale), off

@@ -25,6 +25,7 @@ import numpy as np
 
 from shearline.evaluator.base import Array, Outcome, Task, TrialAborted
 from shearline.evaluator.builtin import builtin_names, builtin_task
+from shearline.evaluator.plants import DEFAULT
 from shearline.protocol.errors import ConfigError
 from shearline.protocol.space import Space
 from shearline.protocol.task import TaskSpec
@@ -171,19 +172,20 @@ def outcome_of(returned: object) -> Outcome:
     )
 
 
-def load_task(name: str) -> Task:
+def load_task(name: str, plant: str = DEFAULT) -> Task:
     """Return the task that a person on this machine named.
 
     Args:
         name: A built-in's name, ``"my_file:bowl"``, ``"my_file.py:bowl"`` (a file in the current
             folder, or a path) or ``"my_lab.tasks:grind"`` (a module).
+        plant: What a built-in that has a plant acts on.
 
     Raises:
         ConfigError: If there is no such task, or its file cannot be imported.
     """
     where, colon, function = name.partition(":")
     if not colon:
-        return builtin_task(name)
+        return builtin_task(name, plant)
     module, called = _import(where)
     found = getattr(module, function, None)
     if not callable(found):

@@ -24,6 +24,7 @@ from shearline.evaluator.builtin import builtin_task
 from shearline.evaluator.local import Verdict, run_trial
 from shearline.evaluator.mail import Beat, Ended, Prepare, Ready, Run
 from shearline.evaluator.mailbox import RENEW_LEASES, Mailbox
+from shearline.evaluator.plants import DEFAULT
 from shearline.evaluator.postman import End, Exchange, Postman
 from shearline.evaluator.showing import TRACE_HZ, Showing
 from shearline.evaluator.tasks import FunctionTask
@@ -66,6 +67,7 @@ class WorkerConfig:
         connect: The learner's endpoint, e.g. ``"tcp/192.168.1.5:7447"``.
         name: Unique among the evaluators of a run.
         credits: Attempts held at once: 2 for simulators (one runs, one waits), 1 for a robot.
+        plant: What the learner's task acts on here, if it has a plant.
         kind: ``"simulator"``, ``"function"``, ``"robot"``, or ``""`` to tell by the task.
         wait_s: How long to wait for a learner at the start [s], ``None`` for ever.
         forever: Wait for the next run when one ends.
@@ -77,6 +79,7 @@ class WorkerConfig:
     connect: str
     name: str = field(default_factory=default_name)
     credits: int = 2
+    plant: str = DEFAULT
     kind: str = ""
     wait_s: float | None = 10.0
     forever: bool = False
@@ -177,7 +180,7 @@ class Worker:
             self.exchange.put(Ready(self._engine, digest(spec)))
             return
         try:
-            task = builtin_task(spec.name)
+            task = builtin_task(spec.name, self._config.plant)
         except ConfigError:
             self.exchange.leave(
                 2, f"the run learns {spec.name!r}, which is no built-in: name it with --task"

@@ -15,6 +15,7 @@ import numpy as np
 from shearline.learner.base import Array, Proposal, Recommendation
 from shearline.learner.errors import LearnerError
 from shearline.learner.ledger import Ledger, Trials
+from shearline.learner.prior import Prior
 from shearline.learner.recommend import Focus, elite_focus, recommendation
 from shearline.learner.threads import load
 from shearline.protocol.space import Space
@@ -41,6 +42,9 @@ class EpisodicLearner(ABC):
     #: Whether renewing the model is a fit, for which libraries are loaded that take a second.
     fits = False
 
+    #: Whether it can start from the trials of another run; its model must then take any trials.
+    primes = False
+
     def __init__(self, space: Space, episode_length: int = 20, seed: int = 0) -> None:
         if episode_length < 1:
             raise LearnerError(f"an episode has at least 1 trial, got {episode_length}")
@@ -56,7 +60,7 @@ class EpisodicLearner(ABC):
 
     @abstractmethod
     def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
-        """Renew the model for one episode from everything told until now."""
+        """Renew the model for one episode from everything told until now, and the prior."""
 
     @abstractmethod
     def _draw(self, index: int, rng: np.random.Generator) -> Array:
@@ -83,11 +87,28 @@ class EpisodicLearner(ABC):
         self._ledger.tell(trial, cost, success=success)
 
     def recommend(self) -> Recommendation:
-        """Return a robust tuple; see :class:`shearline.learner.base.Learner`."""
+        """Return a robust tuple; see :class:`shearline.learner.base.Learner`.
+
+        A prior may say where to stand, never what is claimed for it.
+        """
         if not self._ledger.asked:
             raise LearnerError("nothing has been asked for yet: ask and tell before recommend")
-        trials = self._ledger.trials()
-        return recommendation(self.space, trials, self._focus(trials))
+        begun = -(-self._ledger.asked // self.episode_length)
+        focus = self._focus(self._ledger.known(begun))
+        return recommendation(self.space, self._ledger.trials(), focus)
+
+    def prime(self, prior: Prior) -> None:
+        """Start from the trials of another run, before anything is asked for.
+
+        Raises:
+            LearnerError: If this learner cannot, or something was asked for.
+        """
+        if not self.primes:
+            raise LearnerError(f"{self.name} cannot start from another run: choose another learner")
+        if self._ledger.asked:
+            raise LearnerError("trials were asked for already: start from another run before that")
+        u = np.clip(self.space.normalise(np.array(prior.theta)), 0.0, 1.0)
+        self._ledger.prime(u, np.array(prior.cost), np.array(prior.success, dtype=np.bool_))
 
     def warm(self) -> None:
         """Load what the first fit needs; for whoever has time before it. By default nothing."""
@@ -116,7 +137,7 @@ class EpisodicLearner(ABC):
             # One generator per episode, from the seed alone: what an episode draws cannot depend
             # on how many numbers the ones before it used up.
             self._rng = np.random.default_rng(np.random.SeedSequence([self.seed, episode]))
-            self._begin(episode, self._ledger.trials(), self._rng)
+            self._begin(episode, self._ledger.known(episode), self._rng)
         u = np.clip(self._draw(index, self._rng), 0.0, 1.0)
         trial = self._ledger.add(u)
         return Proposal(trial=trial, theta=self.space.denormalise(u))

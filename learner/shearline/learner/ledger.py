@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from shearline.learner.base import Array
 from shearline.learner.errors import LearnerError
+from shearline.learner.prior import left
 
 #: Trials there is room for at first.
 ROOM_MIN = 64
@@ -24,7 +25,7 @@ class Trials:
     """Told outcomes, sorted by trial number.
 
     Attributes:
-        number: Trial numbers ``(m,)``, rising.
+        number: Trial numbers ``(m,)``, rising; those of a prior are negative.
         u: Tuples in unit coordinates ``(m, n)``.
         cost: Raw costs ``(m,)`` in the task's unit; a failure's cost is kept but means little.
         success: Whether the task's goal was reached ``(m,)``.
@@ -64,6 +65,8 @@ class Ledger:
         self._cost = np.empty(ROOM_MIN)
         self._success = np.zeros(ROOM_MIN, dtype=np.bool_)
         self._told = np.zeros(ROOM_MIN, dtype=np.bool_)
+        nothing = np.zeros(0, dtype=np.bool_)
+        self._prior = Trials(np.zeros(0, np.int64), np.zeros((0, n)), np.zeros(0), nothing)
 
     @property
     def asked(self) -> int:
@@ -106,8 +109,24 @@ class Ledger:
                 " an outcome is final, drop the second one"
             )
 
+    def prime(self, u: Array, cost: Array, success: npt.NDArray[np.bool_]) -> None:
+        """Take over ``m`` trials of another run: ``u (m, n)``, ``cost (m,)``, ``success (m,)``."""
+        self._prior = Trials(np.arange(-len(u), 0), u, cost, success)
+
+    def known(self, episode: int) -> Trials:
+        """Return what is left of the prior in an episode, and everything told so far."""
+        prior, own = self._prior.last(left(len(self._prior), episode)), self.trials()
+        if not len(prior):
+            return own
+        return Trials(
+            np.concatenate([prior.number, own.number]),
+            np.concatenate([prior.u, own.u]),
+            np.concatenate([prior.cost, own.cost]),
+            np.concatenate([prior.success, own.success]),
+        )
+
     def trials(self) -> Trials:
-        """Return everything told so far, sorted by trial number."""
+        """Return everything told so far, sorted by trial number, without a prior."""
         number = np.flatnonzero(self._told)
         return Trials(number, self._u[number], self._cost[number], self._success[number])
 

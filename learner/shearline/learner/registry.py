@@ -30,6 +30,12 @@ LEARNERS: Mapping[str, str] = MappingProxyType(
     }
 )
 
+#: Learners that need more than the extra ``learner``; studies of all learners leave them out.
+EXTRAS: Mapping[str, str] = MappingProxyType({"tpe": "shearline.learner.tpe:TPE"})
+
+#: Those that can start from the trials of another run.
+PRIMED = frozenset({"psp-ranked", "psp", "psp-paper", "tpe"})
+
 #: Not an optimiser, so not listed: it tries the tuples it is given, ``tuples=[...]``.
 UNLISTED: Mapping[str, str] = MappingProxyType({"plan": "shearline.learner.plan:Plan"})
 
@@ -39,7 +45,7 @@ ALIASES: Mapping[str, str] = MappingProxyType({"best": "psp-ranked"})
 
 def names() -> tuple[str, ...]:
     """Return every name that :func:`create` takes, aliases last."""
-    return (*LEARNERS, *ALIASES)
+    return (*LEARNERS, *EXTRAS, *ALIASES)
 
 
 def resolve(name: str) -> str:
@@ -49,7 +55,7 @@ def resolve(name: str) -> str:
         UnknownLearnerError: If there is no such learner.
     """
     resolved = ALIASES.get(name, name)
-    if resolved not in LEARNERS and resolved not in UNLISTED:
+    if resolved not in {**LEARNERS, **EXTRAS, **UNLISTED}:
         raise UnknownLearnerError(
             f"no learner is called {name!r}: expected one of {', '.join(names())}"
         )
@@ -81,7 +87,7 @@ def create(
         [0, 1, 2]
     """
     resolved = resolve(name)
-    module, _, attribute = {**LEARNERS, **UNLISTED}[resolved].partition(":")
+    module, _, attribute = {**LEARNERS, **EXTRAS, **UNLISTED}[resolved].partition(":")
     make = getattr(importlib.import_module(module), attribute)
     try:
         call = inspect.signature(make).bind(space, episode_length, seed, **switches)

@@ -8,7 +8,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from shearline.learner.registry import LEARNERS, resolve
+from shearline.learner.registry import EXTRAS, LEARNERS, resolve
 
 #: What a learner's proposals may depend on, beside Python.
 PACKAGES = ("shearline", "numpy", "scipy", "scikit-learn", "cma")
@@ -35,7 +35,7 @@ def code_of(learner: str) -> str:
     Raises:
         UnknownLearnerError: If there is no such learner.
     """
-    module = LEARNERS[resolve(learner)].partition(":")[0]
+    module = {**LEARNERS, **EXTRAS}[resolve(learner)].partition(":")[0]
     package = module.rpartition(".")[0]
     spec = importlib.util.find_spec(module if package == SHELF else package)
     assert spec is not None

@@ -12,7 +12,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 Triple = tuple[float, float, float]
 
@@ -85,6 +87,17 @@ class Key:
             ]
         corners.append((self.length_m, top))
         return _distinct(corners)
+
+
+#: Keys by name. Neighbouring cuts leave room for both their ramps: they add up to no more than
+#: their distance less the flats, 3.2 mm; the first is at most .8 mm, behind the ramp at the tip.
+KEYS: Mapping[str, Key] = MappingProxyType(
+    {
+        "a": Key(),
+        "b": Key(cut_depth_m=(0.4e-3, 1.6e-3, 0.8e-3, 1.4e-3, 0.6e-3)),
+        "c": Key(cut_depth_m=(0.6e-3, 1.0e-3, 1.6e-3, 1.2e-3, 0.8e-3)),
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from shearline.sims.compiled import call_with_two_addresses, compiled
 from shearline.sims.lock import PINS
 from shearline.sims.panda import JOINTS, Array
 from shearline.sims.plant import Percept, PlantError, Setup
-from shearline.sims.scene import Scene, quaternion
+from shearline.sims.scene import Scene, key_in_hand, quaternion
 
 _log = logging.getLogger(__name__)
 
@@ -35,15 +35,17 @@ class Handles(NamedTuple):
         model: Address of the ``mjModel``.
         data: Address of the ``mjData``.
         substeps: Engine steps in one tick.
-        qpos: ``(12,)`` arm first, then pins [rad, m].
-        qvel: ``(12,)``.
-        bias: ``qfrc_bias (12,)`` [N m, N].
-        constraint: ``qfrc_constraint (12,)`` [N m, N].
-        applied: ``qfrc_applied (12,)``; the motors act here [N m].
-        anchor: ``xanchor (12, 3)`` [m].
-        axis: ``xaxis (12, 3)``.
-        tip: ``site_xpos`` of the tip ``(3,)`` [m].
-        turn: ``site_xmat`` of the tip ``(9,)``.
+        first_pin: Number of the first pin's joint: 7, or 9 where the grasp gives.
+        qpos: ``(12,)`` or ``(14,)`` arm first, then grasp, then pins [rad, m].
+        qvel: Of as many.
+        bias: ``qfrc_bias`` [N m, N].
+        constraint: ``qfrc_constraint`` [N m, N].
+        applied: ``qfrc_applied``; the motors act here [N m].
+        anchor: ``xanchor (joints, 3)`` [m].
+        axis: ``xaxis (joints, 3)``.
+        tip: ``site_xpos`` of the tip in the nominal grasp ``(3,)`` [m].
+        turn: ``site_xmat`` of the same ``(9,)``.
+        true_tip: ``site_xpos`` of the tip ``(3,)`` [m].
         lock: ``xpos`` of the lock ``(3,)`` [m].
         lock_turn: ``xmat`` of the lock ``(9,)``.
         contact: Sum of the constraint torques over the substeps of a tick ``(7,)`` [N m].
@@ -54,6 +56,7 @@ class Handles(NamedTuple):
     model: int
     data: int
     substeps: int
+    first_pin: int
     qpos: Array
     qvel: Array
     bias: Array
@@ -63,6 +66,7 @@ class Handles(NamedTuple):
     axis: Array
     tip: Array
     turn: Array
+    true_tip: Array
     lock: Array
     lock_turn: Array
     contact: Array
@@ -93,10 +97,10 @@ def begin_tick(handles: Handles, percept: Percept) -> None:
         inside = 0.0
         for k in range(3):
             percept.rotation[i, k] = h.turn[3 * i + k]
-            inside += h.lock_turn[3 * k + i] * (h.tip[k] - h.lock[k])
+            inside += h.lock_turn[3 * k + i] * (h.true_tip[k] - h.lock[k])
         percept.in_lock[i] = inside
     for i in range(PINS):
-        percept.pins[i] = h.qpos[JOINTS + i]
+        percept.pins[i] = h.qpos[h.first_pin + i]
 
 
 @compiled
@@ -145,11 +149,11 @@ class MujocoPlant:
                 "the model came out with a sparse Jacobian, expected a dense one:"
                 " MuJoCo 4.0.0's sparse factorisation is not to be trusted here"
             )
-        assert self.model.nv == JOINTS + PINS
+        assert self.model.nv == JOINTS + self.scene.grip_joints + PINS
         self.model_hash = hashlib.sha256(text.encode()).hexdigest()[:12]
         self._stiffness = self.model.jnt_stiffness.copy()
         self._friction = self.model.geom_friction.copy()
-        self.handles = _handles(self.model, self.data, self.scene.settings.substeps)
+        self.handles = _handles(self.model, self.data, self.scene)
 
     @property
     def engine(self) -> str:
@@ -157,17 +161,34 @@ class MujocoPlant:
         return f"mujoco {mujoco.__version__} model {self.model_hash}"
 
     def reset(self, setup: Setup) -> None:
-        """Go to the start of a trial, at rest."""
+        """Go to the start of a trial, at rest.
+
+        Raises:
+            PlantError: If the key is to sit off in a scene in which it is one with the hand.
+        """
         mujoco.mj_resetData(self.model, self.data)
         self.model.geom_friction[:] = self._friction
         if setup.friction is not None:
             self.model.geom_friction[:, 0] = setup.friction
+        first_pin = self.handles.first_pin
         self.model.jnt_stiffness[:] = self._stiffness
-        self.model.jnt_stiffness[JOINTS:] *= np.array(setup.pin_scale)
+        self.model.jnt_stiffness[JOINTS:first_pin] *= setup.pad_scale
+        self.model.jnt_stiffness[first_pin:] *= np.array(setup.pin_scale)
+        self._hold(setup)
         self.data.qpos[:JOINTS] = setup.q
         self.data.mocap_pos[0] = setup.lock.position
         self.data.mocap_quat[0] = quaternion(setup.lock.rotation)
         self.handles.contact[:] = 0.0
+
+    def _hold(self, setup: Setup) -> None:
+        """Put the key between the fingers."""
+        if self.scene.grasp is None:
+            if any(setup.grip):
+                raise PlantError("the key sits off in the fingers, expected a scene with a grasp")
+            return
+        pose, key = key_in_hand(setup.grip), self.model.body("key")
+        key.pos[:] = pose.position
+        key.quat[:] = quaternion(pose.rotation)
 
     def sense(self, percept: Percept) -> None:
         """Fill ``percept`` with the present."""
@@ -199,15 +220,17 @@ class MujocoPlant:
         return full[:JOINTS, :JOINTS]
 
 
-def _handles(model: Any, data: Any, substeps: int) -> Handles:
-    tip = model.site("tip").id
+def _handles(model: Any, data: Any, scene: Scene) -> Handles:
+    true_tip = model.site("tip").id
+    tip = true_tip if scene.grasp is None else model.site("held").id
     lock = model.body("lock").id
     return Handles(
         step1=library_address("mj_step1"),
         step2=library_address("mj_step2"),
         model=model._address,  # noqa: SLF001 - MuJoCo's documented way to the C struct
         data=data._address,  # noqa: SLF001
-        substeps=substeps,
+        substeps=scene.settings.substeps,
+        first_pin=JOINTS + scene.grip_joints,
         qpos=data.qpos,
         qvel=data.qvel,
         bias=data.qfrc_bias,
@@ -217,6 +240,7 @@ def _handles(model: Any, data: Any, substeps: int) -> Handles:
         axis=data.xaxis,
         tip=data.site_xpos[tip],
         turn=data.site_xmat[tip],
+        true_tip=data.site_xpos[true_tip],
         lock=data.xpos[lock],
         lock_turn=data.xmat[lock],
         contact=np.zeros(JOINTS),

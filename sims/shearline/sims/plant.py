@@ -15,6 +15,7 @@ import numpy as np
 
 from shearline.protocol.errors import ShearlineError
 from shearline.sims.lock import PINS
+from shearline.sims.noise import TorqueNoise
 from shearline.sims.panda import JOINTS, Array
 from shearline.sims.scene import Q_START, Pose, believed_lock_pose
 
@@ -29,13 +30,15 @@ class Percept(NamedTuple):
     Attributes:
         q: Joint angles ``(7,)`` [rad].
         dq: Joint speeds ``(7,)`` [rad/s].
-        tip: Position of the key's tip in the base frame ``(3,)`` [m].
-        rotation: Rotation of the key in the base frame ``(3, 3)``.
-        jacobian: Of the tip in the base frame, translation first ``(6, 7)``.
+        tip: Where joint angles and nominal grasp put the key's tip, in the base frame ``(3,)``
+            [m]: a key that sits otherwise in the fingers, or gives, is not felt.
+        rotation: The key's rotation in the base frame by the same reckoning ``(3, 3)``.
+        jacobian: Of that tip in the base frame, translation first ``(6, 7)``.
         bias: Torque that balances gravity, centrifugal and Coriolis forces ``(7,)`` [N m].
         contact: Torque with which the surroundings act on the joints, mean over the last tick
             ``(7,)`` [N m].
-        in_lock: Position of the tip in the frame of the lock itself ``(3,)`` [m]; z is the depth.
+        in_lock: Position of the true tip in the frame of the lock itself ``(3,)`` [m]; z is the
+            depth. It decides the verdict and steers nothing.
         pins: How far the pins are pushed in ``(5,)`` [m]; 0 where a plant cannot know.
     """
 
@@ -69,17 +72,28 @@ def empty_percept() -> Percept:
 class Setup:
     """What differs from trial to trial.
 
+    A plant honours all of it but the noise, which whoever runs the trial adds to what the plant
+    says of contacts: it is the same on every engine.
+
     Attributes:
         lock: Where the lock truly is.
         friction: Coulomb coefficient of every contact, or ``None`` for the scene's own.
         pin_scale: Factor on stiffness and preload of each pin ``(5,)``.
         q: Joint angles at the start ``(7,)`` [rad].
+        grip: How the key sits in the fingers off the nominal grasp ``(6,)``: shift [m], then turn
+            [rad], in its own frame about the middle of the grip
+            (:data:`~shearline.sims.grasp.GRIP_M` behind the tip).
+        pad_scale: Factor on the stiffness of the scene's grasp, if that gives at all.
+        noise: What the torque sensors add, or ``None``.
     """
 
     lock: Pose = field(default_factory=believed_lock_pose)
     friction: float | None = None
     pin_scale: tuple[float, ...] = (1.0,) * PINS
     q: tuple[float, ...] = tuple(Q_START.tolist())
+    grip: tuple[float, ...] = (0.0,) * 6
+    pad_scale: float = 1.0
+    noise: TorqueNoise | None = None
 
 
 class Plant(Protocol):

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shearline.sims import panda
+from shearline.sims.grasp import GRIP_M, Grasp
 from shearline.sims.lock import Box, Lock, Pin, bitting, blade, body, walls
 from shearline.sims.panda import Array, Link
 
@@ -28,7 +29,9 @@ TIP_M = panda.HAND_REACH_M + 38e-3
 #: The key's x axis (thickness) is the closing direction of the fingers.
 KEY_TURN = math.pi / 4.0
 
+#: The key with its bow: mass [kg], inertia about its centre of mass at the bow [kg m^2].
 KEY_MASS = 0.02
+KEY_INERTIA = (4e-6, 4e-6, 2e-6)
 
 #: One tick of the controller [s].
 TICK_S = 1e-3
@@ -77,10 +80,22 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Everything that decides the model: a change of any field changes the model's hash."""
+    """Everything that decides the model: a change of any field changes the model's hash.
+
+    Attributes:
+        lock: With its key.
+        settings: How MuJoCo solves it.
+        grasp: What is between hand and key; ``None``: they are one piece.
+    """
 
     lock: Lock = field(default_factory=Lock)
     settings: Settings = field(default_factory=Settings)
+    grasp: Grasp | None = None
+
+    @property
+    def grip_joints(self) -> int:
+        """Joints between hand and key, about x and y of the key."""
+        return 0 if self.grasp is None else len(self.grasp.stiffness)
 
     def mjcf(self) -> str:
         """Return the model as MJCF text."""
@@ -92,6 +107,17 @@ def tip_pose(q: Array) -> Pose:
     position, rotation = panda.flange_pose(q)
     tip = position + rotation @ np.array([0.0, 0.0, TIP_M])
     return Pose(tip, rotation @ panda.rotation_z(KEY_TURN))
+
+
+def key_in_hand(grip: tuple[float, ...] = (0.0,) * 6) -> Pose:
+    """Return the frame of the key in that of the last link, for a key that sits off by ``grip``.
+
+    Args:
+        grip: As in :class:`~shearline.sims.plant.Setup` ``(6,)`` [m, rad].
+    """
+    nominal = Pose(np.array([0.0, 0.0, panda.FLANGE_M + TIP_M]), panda.rotation_z(KEY_TURN))
+    middle = np.array([0.0, 0.0, -GRIP_M])
+    return nominal.moved(middle + grip[:3], np.array(grip[3:])).moved(-middle, np.zeros(3))
 
 
 def believed_lock_pose() -> Pose:
@@ -211,6 +237,8 @@ def _tool(scene: Scene) -> str:
     boxes += "".join(_geom(box, "drawn", ".58 .61 .66 1") for box in body(key))
     boxes += "".join(_geom(box, "bitting") for box in bitting(key))
     half = math.pi / 8.0
+    quat = _text((math.cos(turn), 0.0, 0.0, math.sin(turn)))
+    place = f'pos="0 0 {panda.FLANGE_M + TIP_M!r}"\n quat="{quat}"'
     return f"""<body name="hand" pos="0 0 {panda.FLANGE_M!r}"
  quat="{_text((math.cos(half), 0.0, 0.0, -math.sin(half)))}">
 <inertial pos="{_text(panda.HAND_CENTRE)}" mass="{panda.HAND_MASS!r}"
@@ -219,14 +247,30 @@ def _tool(scene: Scene) -> str:
 <geom class="drawn" type="box" pos="0 .012 .082" size=".009 .011 .028" rgba=".30 .33 .38 1"/>
 <geom class="drawn" type="box" pos="0 -.012 .082" size=".009 .011 .028" rgba=".30 .33 .38 1"/>
 </body>
-<body name="key" pos="0 0 {panda.FLANGE_M + TIP_M!r}"
- quat="{_text((math.cos(turn), 0.0, 0.0, math.sin(turn)))}">
-<inertial pos="0 0 {-key.length_m!r}" mass="{KEY_MASS!r}" diaginertia="4e-6 4e-6 2e-6"/>
-<site name="tip" size="0.0003" group="5"/>
+{_held(scene.grasp, place)}<body name="key" {place}>
+<inertial pos="0 0 {-key.length_m!r}" mass="{KEY_MASS!r}" diaginertia="{_micro(KEY_INERTIA)}"/>
+{_grip(scene.grasp)}<site name="tip" size="0.0003" group="5"/>
 <geom class="drawn" type="box" pos="0 0 {-key.length_m - bow / 2.0!r}"
  size="{key.thickness_m / 2.0!r} .0095 {bow / 2.0!r}" rgba=".58 .61 .66 1"/>
 {boxes}
 </body>"""
+
+
+def _held(grasp: Grasp | None, place: str) -> str:
+    """Mark where the tip would be in the nominal grasp, where that may be elsewhere."""
+    return "" if grasp is None else f'<site name="held" size="0.0003" group="5" {place}/>\n'
+
+
+def _grip(grasp: Grasp | None) -> str:
+    """Return the joints about which the key turns between the fingers."""
+    if grasp is None:
+        return ""
+    about = zip(("1 0 0", "0 1 0"), grasp.stiffness, grasp.damping, strict=False)
+    return "".join(
+        f'<joint name="grip{i}" type="hinge" axis="{axis}" pos="0 0 {-GRIP_M!r}"'
+        f' stiffness="{stiffness!r}" damping="{damping!r}"/>\n'
+        for i, (axis, stiffness, damping) in enumerate(about)
+    )
 
 
 def _pin(pin: Pin, lock: Lock) -> str:
@@ -261,6 +305,10 @@ def _geom(box: Box, kind: str, rgba: str = "") -> str:
         f'<geom name="{box.name}" class="{kind}" type="box" pos="{_text(box.centre)}"'
         f' size="{_text(box.half)}" quat="{_text(quat)}"{colour}/>\n'
     )
+
+
+def _micro(values: tuple[float, ...]) -> str:
+    return " ".join(f"{1e6 * value:g}e-6" for value in values)
 
 
 def _text(values: tuple[float, ...] | Array) -> str:

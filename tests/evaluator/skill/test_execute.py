@@ -9,7 +9,8 @@ from shearline.evaluator.base import TrialAborted
 from shearline.evaluator.keylock import KeylockTask
 from shearline.evaluator.skill import manipulation
 from shearline.evaluator.skill.baselines import TUPLES, tuple_of
-from shearline.evaluator.skill.execute import CHUNK_TICKS, Job, execute, execute_compiled
+from shearline.evaluator.skill.execute import Job, execute
+from shearline.evaluator.skill.loop import CHUNK_TICKS, execute_compiled
 from shearline.evaluator.skill.physics import random_tuples
 from shearline.evaluator.skill.semantic import END, PHASES, SEARCH, SUCCESS, VERDICTS
 from shearline.evaluator.skill.trace import COLUMNS, digest, trace

@@ -24,6 +24,7 @@ DISTRIBUTIONS = {
     "scikit-learn": "psp",
     "mujoco": "keylock",
     "numba": "keylock",
+    "pybullet": "--plant pybullet",
     "mcap": "record",
     "protobuf": "record",
     "rerun-sdk": "view",

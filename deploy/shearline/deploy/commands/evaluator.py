@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 
-from shearline.deploy.options import Subparsers, add_connect, add_traces, positive
+from shearline.deploy.options import Subparsers, add_connect, add_plant, add_traces, positive
 
 
 def register(commands: Subparsers) -> None:
@@ -19,7 +19,7 @@ def register(commands: Subparsers) -> None:
     add_connect(command, patience_s=10.0)
     command.add_argument("--name", help="unique name in the run (default HOST-PID)")
     command.add_argument("--task", help="your own task, file:function (default: the learner's)")
-    command.add_argument("--plant", choices=("mujoco",), default="mujoco", help="what to act on")
+    add_plant(command)
     command.add_argument("--credits", type=positive, default=2, help="trials held at once")
     command.add_argument("--forever", action="store_true", help="wait for the next run too")
     add_traces(command)
@@ -42,12 +42,13 @@ def run(arguments: argparse.Namespace) -> int:
         connect=arguments.connect,
         name=arguments.name or default_name(),
         credits=arguments.credits,
+        plant=arguments.plant,
         wait_s=None if arguments.forever else arguments.patience,
         forever=arguments.forever,
         traces=not arguments.no_traces,
         trace_hz=arguments.trace_hz,
     )
-    end = run_worker(config, load_task(arguments.task) if arguments.task else None)
+    end = run_worker(config, load_task(arguments.task, arguments.plant) if arguments.task else None)
     print(f"shearline: {end.why}", file=sys.stderr, flush=True)
     # A session that will not close, or a trial that will not return, must not keep us here.
     os._exit(end.code)

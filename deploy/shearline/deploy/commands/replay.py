@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from shearline.deploy.exits import Exit
-from shearline.deploy.options import Subparsers, add_json, at_least, positive
+from shearline.deploy.options import PLANTS, Subparsers, add_json, at_least, positive
 from shearline.protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def register(commands: Subparsers) -> None:
         metavar="NAME=VALUE",
         help="another value for a parameter, in its unit",
     )
+    what_if.add_argument("--plant", choices=PLANTS, help="another plant than on record")
     what_if.add_argument("--seed", type=at_least(0), metavar="S", help="another seed")
     command.add_argument("--save", metavar="FILE.rrd", type=Path, help="write a file for Rerun")
     command.add_argument("--video", metavar="FILE.mp4", type=Path, help="make a film of the trial")
@@ -74,6 +75,8 @@ def replay(arguments: argparse.Namespace) -> int:
 def _check(arguments: argparse.Namespace) -> None:
     """Refuse what does not go together."""
     changed = bool(arguments.changes) or arguments.seed is not None
+    if arguments.verify and arguments.plant:
+        raise ConfigError("a trial is proved on the plant that is on record: leave out --plant")
     if arguments.all and not arguments.verify:
         raise ConfigError("what is to be done with all trials? Add --verify, or name one: --trial")
     if arguments.verify and changed:
@@ -102,7 +105,7 @@ def _one(arguments: argparse.Namespace, run: Run) -> int:
         check_ended(case)
     if arguments.video:
         _ready_to_film(name, arguments.video)
-    task = load(name)
+    task = load(name, arguments.plant or case.plant)
     replayed = again(task, case, change)
     verified = judge(replayed, task.spec) if case.ended and not change else None
     if not arguments.json:

@@ -10,9 +10,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shearline.deploy.commands import claims, switches
+from shearline.deploy.commands import agreement, claims, section5, switches
 from shearline.deploy.exits import Exit
-from shearline.deploy.options import Subparsers, add_json, at_least, positive
+from shearline.deploy.options import Subparsers, add_json, add_plant, at_least, positive
 from shearline.protocol.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ def register(commands: Subparsers) -> None:
     _register_fig3(kinds)
     _register_fig4(kinds)
     _register_lock(kinds)
+    section5.register(kinds)
+    agreement.register(kinds)
     claims.register(kinds)
     switches.register(kinds)
 
@@ -95,6 +97,7 @@ def _register_lock(kinds: Subparsers) -> None:
     lock.add_argument("--experiments", type=positive, default=5, metavar="M")
     lock.add_argument("--first-seed", type=at_least(0), default=0, metavar="S")
     lock.add_argument("--fresh", type=positive, default=100, metavar="N", help="default 100")
+    add_plant(lock)
     lock.add_argument("--workers", type=positive, default=2, metavar="W", help="evaluators")
     lock.add_argument(
         "--out",
@@ -232,6 +235,7 @@ def run_lock(arguments: argparse.Namespace) -> int:
         range(first, first + arguments.experiments),
         evaluators=arguments.workers,
         fresh=arguments.fresh,
+        plant=arguments.plant,
         folder=arguments.out or Path("runs", time.strftime("lock-%Y%m%d-%H%M%S")),
     ):
         done.append(one)

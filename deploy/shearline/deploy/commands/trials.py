@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 
 from shearline.deploy.exits import Exit
 from shearline.deploy.options import Subparsers, add_json
-from shearline.learner.run.folder import JOURNAL
-from shearline.protocol.errors import ConfigError, RecordError
-from shearline.protocol.messages import Counted
+from shearline.protocol.errors import ConfigError
 
 if TYPE_CHECKING:
     from shearline.record.reader import Run
@@ -36,7 +34,9 @@ def list_trials(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"which format? give --format {'|'.join(FORMATS)} with --out")
     if form == "parquet" and not arguments.out and sys.stdout.isatty():
         raise ConfigError("Parquet is not for a terminal: give --out FILE.parquet")
-    run = _opened(arguments.run)
+    from shearline.deploy.opened import opened  # noqa: PLC0415 - loads what leads a run
+
+    run = opened(arguments.run)
     for sentence in run.damage:
         print(f"shearline: {sentence}", file=sys.stderr)
     if form is None:
@@ -44,29 +44,6 @@ def list_trials(arguments: argparse.Namespace) -> int:
     else:
         _hand_on(run, form, arguments.out)
     return Exit.OK
-
-
-def _opened(run_dir: Path) -> Run:
-    """Open the record of a run, or what its journal says where it was run without one.
-
-    Raises:
-        RecordError: If there is neither.
-    """
-    from shearline.deploy.lead import outcomes  # noqa: PLC0415 - loads what leads a run
-    from shearline.record.head import config_of  # noqa: PLC0415 - mcap loads on use
-    from shearline.record.parts import parts  # noqa: PLC0415 - as above
-    from shearline.record.reader import open_run  # noqa: PLC0415 - as above
-
-    run = open_run(run_dir)
-    if not parts(run.run_dir):
-        if not (run.run_dir / JOURNAL).is_file():
-            raise RecordError(
-                f"expected a run in {run_dir}, found neither a record nor a journal: check the path"
-            )
-        run.config = config_of(run.run_dir.resolve().name, run.run_dir)
-        counted = [said for said in outcomes(run.run_dir) if isinstance(said, Counted)]
-        run.outcomes = sorted(counted, key=lambda outcome: outcome.trial)
-    return run
 
 
 def _hand_on(run: Run, form: str, out: Path | None) -> None:

@@ -11,6 +11,7 @@ from shearline.deploy.exits import Exit
 from shearline.deploy.options import (
     Subparsers,
     add_json,
+    add_plant,
     add_run,
     add_traces,
     at_least,
@@ -32,7 +33,7 @@ def register(commands: Subparsers) -> None:
     command.add_argument("config", nargs="?", type=Path, metavar="FILE.toml", help="what to run")
     add_run(command)
     command.add_argument("--evaluators", type=at_least(0), default=2, metavar="E", help="default 2")
-    command.add_argument("--plant", choices=("mujoco",), default="mujoco", help="what to act on")
+    add_plant(command)
     command.add_argument(
         "--listen",
         metavar="ENDPOINT",
@@ -56,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
         listen=check_endpoint(arguments.listen or free_endpoint()),
         evaluators=arguments.evaluators,
         task=asked.own_task,
-        evaluator_arguments=trace_arguments(arguments),
+        evaluator_arguments=["--plant", arguments.plant, *trace_arguments(arguments)],
         learner_arguments=[*run_arguments(arguments), "--out", str(asked.run_dir)],
     )
     summary = _launched(launch, as_json=arguments.json)

@@ -1,7 +1,7 @@
 """Verifies many trials at once: fresh processes, results in order, memory bounded.
 
-Each process loads the task once. No more than a few trials per process are under way, so that the
-traces of a long run never stand in memory together.
+Each process loads the task once for each plant. No more than a few trials per process are under
+way, so that the traces of a long run never stand in memory together.
 """
 
 from __future__ import annotations
@@ -88,12 +88,12 @@ def _ended_early() -> Iterator[None]:
 
 
 @cache
-def _task(name: str) -> Task:
-    return load(name)
+def _task(name: str, plant: str) -> Task:
+    return load(name, plant)
 
 
 def _verify(name: str, case: Case) -> Verification:
-    return verify(_task(name), case)
+    return verify(_task(name, case.plant), case)
 
 
 def _begin(parent: int) -> None:

@@ -12,6 +12,7 @@ from functools import cached_property
 import msgspec
 
 from shearline.evaluator import base
+from shearline.evaluator.plants import DEFAULT
 from shearline.evaluator.replay import Case
 from shearline.evaluator.tasks import load_task
 from shearline.protocol.codec import decode
@@ -152,13 +153,17 @@ class Recorded:
         return engines
 
 
-def load(name: str) -> base.Task:
+def load(name: str, plant: str = DEFAULT) -> base.Task:
     """Return a task, with what it needs loaded.
+
+    Args:
+        name: What :meth:`Recorded.task_name` returns.
+        plant: What it acts on, if it has a plant.
 
     Raises:
         ConfigError: If there is none of that name, or what it needs is not installed.
     """
-    task = load_task(name)
+    task = load_task(name, plant)
     try:
         _ = task.engine
     except ModuleNotFoundError as missing:

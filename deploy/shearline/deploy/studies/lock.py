@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from shearline.deploy.launch import Launch, QuietShow
+from shearline.evaluator.plants import DEFAULT
 from shearline.learner.run.folder import SUMMARY
 from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.errors import RecordError
@@ -50,7 +51,14 @@ class Experiment:
 
 
 def experiments(
-    task: str, learner: str, seeds: range, *, evaluators: int, fresh: int, folder: Path
+    task: str,
+    learner: str,
+    seeds: range,
+    *,
+    evaluators: int,
+    fresh: int,
+    folder: Path,
+    plant: str = DEFAULT,
 ) -> Iterator[Experiment]:
     """Yield one experiment per seed: 10 episodes of 20 trials, then ``fresh`` trials.
 
@@ -63,6 +71,7 @@ def experiments(
         evaluators: Processes that run trials.
         fresh: Trials of each recommended tuple, at least 1.
         folder: Where the run folders go.
+        plant: What the evaluators act on.
 
     Raises:
         RunFailed: If a run fails.
@@ -70,13 +79,15 @@ def experiments(
         KeyboardInterrupt: If it was interrupted.
     """
     for seed in seeds:
-        run_dir = folder / f"{task}-{learner}-{seed}-{fresh}"
+        on = "" if plant == DEFAULT else f"-{plant}"
+        run_dir = folder / f"{task}-{learner}-{seed}-{fresh}{on}"
         asked = ["--task", task, "--learner", learner, "--seed", str(seed), "--no-record"]
         launch = Launch(
             run_dir=run_dir,
             listen=free_endpoint(),
             evaluators=evaluators,
             task=None,
+            evaluator_arguments=["--plant", plant],
             learner_arguments=[*asked, "--confirm", str(fresh), "--out", str(run_dir)],
         )
         summary = _complete(run_dir) or launch.run(QuietShow())

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import msgspec
 
 from shearline.evaluator.base import Trace
+from shearline.evaluator.plants import DEFAULT, plant_of
 from shearline.protocol.messages import Counted, OutcomeKind, Proposed
 from shearline.protocol.task import TaskSpec
 
@@ -43,6 +44,11 @@ class Case:
     def ended(self) -> bool:
         """Whether it has an outcome: a lost trial has none."""
         return self.outcome is not None and self.outcome.kind is not None
+
+    @property
+    def plant(self) -> str:
+        """What it was tried on, the usual plant if it never ended."""
+        return plant_of(self.outcome.engine) if self.outcome else DEFAULT
 
     @property
     def without_trace(self) -> bool:

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from shearline.evaluator.base import Array, Trace
-from shearline.evaluator.keylock import draw_setup
-from shearline.evaluator.keylock_spec import LEVELS, level
+from shearline.evaluator.keylock_draw import draw_setup, scene_of
+from shearline.evaluator.keylock_variation import LEVELS, is_keylock, level
 from shearline.evaluator.replay.again import Replayed
 from shearline.evaluator.replay.strip import CAPTION_HEIGHT, Strip, caption
 from shearline.evaluator.replay.strip import HEIGHT as STRIP_HEIGHT
@@ -43,7 +43,7 @@ def check_filmable(task: str) -> None:
     Raises:
         ConfigError: With the names of the tasks that have one.
     """
-    if task not in LEVELS:
+    if not is_keylock(task):
         raise ConfigError(
             f"expected a task with a scene ({', '.join(LEVELS)}), this run has {task}"
         )
@@ -69,7 +69,8 @@ class Film:
                 " there is nothing to film"
             )
         self._trace = trace
-        self._setup, _ = draw_setup(level(replayed.case.task.name), replayed.seed)
+        self._level = level(replayed.case.task.name)
+        self._setup, _ = draw_setup(self._level, replayed.seed)
         self._caption = caption(replayed, speed, WIDTH)
         step_s = speed / FPS
         times_s = np.arange(0.0, float(trace.t_s[-1]), step_s)
@@ -87,10 +88,10 @@ class Film:
         """
         from shearline.sims.mujoco_plant import MujocoPlant  # noqa: PLC0415 - loads the engine
 
-        plant = MujocoPlant()
+        plant = MujocoPlant(scene_of(self._level))
         plant.model.vis.quality.shadowsize = _SHADOW_PIXELS
         plant.reset(self._setup)
-        postures = _postures(self._trace)
+        postures = _postures(self._trace, plant.scene.grip_joints)
         strip = Strip(self._trace, WIDTH)
         with (
             render.Stage(plant, _NEAR, _SCENE_WIDTH, _VIEW_HEIGHT) as scene,
@@ -105,7 +106,14 @@ class Film:
             yield picture
 
 
-def _postures(trace: Trace) -> Array:
-    """Return joints and pins ``(samples, 12)`` [rad, m]."""
-    names = [name for name in trace.columns if name.startswith(("q.", "pin."))]
-    return np.stack([trace.columns[name][1] for name in names], axis=1).astype(np.float64)
+def _postures(trace: Trace, grip_joints: int) -> Array:
+    """Return joints and pins ``(samples, 12)`` [rad, m].
+
+    Traces say nothing of how the key turns between pads that give: there it is drawn unloaded.
+    """
+    arm, pins = (
+        [values for name, (_, values) in trace.columns.items() if name.startswith(kind)]
+        for kind in ("q.", "pin.")
+    )
+    still = [np.zeros(len(trace.t_s))] * grip_joints
+    return np.stack([*arm, *still, *pins], axis=1).astype(np.float64)

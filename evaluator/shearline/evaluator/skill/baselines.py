@@ -18,7 +18,7 @@ import numpy as np
 
 from shearline.evaluator.base import Array
 from shearline.evaluator.keylock import KeylockTask
-from shearline.evaluator.keylock_spec import LEVELS
+from shearline.evaluator.keylock_variation import LEVELS
 from shearline.evaluator.skill.parameters import space
 
 _SMOOTH = {"xi": 1.1, "ins_k_rot": 40.0, "ins_k_xy": 800.0}
@@ -65,10 +65,11 @@ def row(task: KeylockTask, thetas: Array, first_seed: int = 1000) -> dict[str, o
 def main(arguments: list[str] | None = None) -> int:
     """Print the rows and return an exit code."""
     parser = argparse.ArgumentParser(description="Measure the key-in-lock task without learning.")
+    parser.add_argument("tasks", nargs="*", default=list(LEVELS), help="default: the plain levels")
     parser.add_argument("--tuples", type=int, default=200, help="tuples of the latin hypercube")
     parser.add_argument("--trials", type=int, default=100, help="trials of each fixed tuple")
     options = parser.parse_args(arguments)
-    for name in LEVELS:
+    for name in options.tasks:
         task = KeylockTask(name)
         rows = {"lhs": latin_hypercube(options.tuples, 0)}
         rows |= {key: np.tile(tuple_of(c), (options.trials, 1)) for key, c in TUPLES.items()}

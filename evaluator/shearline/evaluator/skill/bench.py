@@ -15,9 +15,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from shearline.evaluator.keylock import KeylockTask, draw_setup
-from shearline.evaluator.keylock_spec import level
-from shearline.evaluator.skill.execute import execute_compiled, run_ticks
+from shearline.evaluator.keylock import KeylockTask
+from shearline.evaluator.keylock_draw import draw_setup
+from shearline.evaluator.keylock_variation import level
+from shearline.evaluator.skill.execute import noise_of
+from shearline.evaluator.skill.loop import execute_compiled, run_ticks
 from shearline.evaluator.skill.semantic import OPEN, beginning
 from shearline.evaluator.skill.skill import empty_state
 from shearline.evaluator.skill.trace import COLUMNS
@@ -112,7 +114,7 @@ def _compare(task: KeylockTask, seed: int, inside: Tally, free: Tally) -> None:
     bare = mujoco.MjData(plant.model)
     bare_step = library_address("mj_step")
     bare_data = bare._address  # noqa: SLF001 - MuJoCo's documented way to the C struct
-    state, now, done = empty_state(), beginning(), 0
+    state, now, done, noise = empty_state(), beginning(), 0, noise_of(setup)
     h = plant.handles
     while now.verdict == OPEN:
         until = min(done + SLICE_TICKS, len(planned))
@@ -124,7 +126,7 @@ def _compare(task: KeylockTask, seed: int, inside: Tally, free: Tally) -> None:
             if side == "bare":
                 _bare_loop(bare_step, h.model, bare_data, h.substeps, bare.qfrc_applied, tau)
             else:
-                now, done = run_ticks(h, state, now, job, rows, done, until)
+                now, done = run_ticks(h, state, now, job, noise, rows, done, until)
             times[side] = time.thread_time() - start_s
         assert np.array_equal(bare.qpos, plant.data.qpos), "the sides went different ways"
         tally = inside if planned[begun, _DEPTH] > 0.0 else free

@@ -1,8 +1,7 @@
-"""One trial of the skill on a plant, as a closed loop.
+"""One trial of the skill on any plant, as a closed loop that goes through Python in every tick.
 
-:func:`execute_compiled` composes the layers with MuJoCo's primitives into one compiled loop that
-returns to Python often enough for a heart beat; :func:`execute` is the same loop tick by tick for
-any other plant. Both write the same rows.
+What MuJoCo runs instead is the same loop, compiled: :mod:`shearline.evaluator.skill.loop`. Both
+write the same rows.
 """
 
 from __future__ import annotations
@@ -32,9 +31,8 @@ from shearline.evaluator.skill.semantic import (
 from shearline.evaluator.skill.skill import State, empty_state, tick
 from shearline.evaluator.skill.trace import COLUMNS, write_row
 from shearline.sims.compiled import compiled
-from shearline.sims.mujoco_plant import Handles, MujocoPlant, begin_tick, end_tick
-from shearline.sims.panda import Array
-from shearline.sims.plant import Plant, Setup
+from shearline.sims.panda import JOINTS, Array
+from shearline.sims.plant import Percept, Plant, Setup
 from shearline.sims.scene import TICK_S
 
 #: No trial is longer than all its phases together [s].
@@ -42,8 +40,8 @@ TRIAL_MAX_S = APPROACH_S + SETTLE_S + SEARCH_MAX_S + TIME_MAX_S + EXTRACTION_MAX
 
 TICKS_MAX = round(TRIAL_MAX_S / TICK_S)
 
-#: Ticks between two heart beats: about 40 ms of wall time in contact.
-CHUNK_TICKS = 500
+#: Ticks between two heart beats: at most .1 s of wall time in the slowest of plants.
+BEAT_TICKS = 100
 
 
 class Job(NamedTuple):
@@ -62,16 +60,16 @@ class Job(NamedTuple):
     extract: bool
 
 
-def execute_compiled(
-    plant: MujocoPlant, setup: Setup, job: Job, beat: Callable[[], None], rows: Array | None = None
+def execute(
+    plant: Plant, setup: Setup, job: Job, beat: Callable[[], None], rows: Array | None = None
 ) -> tuple[Decision, Array]:
-    """Run one trial in MuJoCo in a compiled loop.
+    """Run one trial tick by tick.
 
     Args:
         plant: Is reset first.
         setup: What differs in this trial.
         job: What to do.
-        beat: Called every :data:`CHUNK_TICKS`; what it raises ends the trial.
+        beat: Called every :data:`BEAT_TICKS`; what it raises ends the trial.
         rows: Buffer ``(TICKS_MAX, columns)`` to write into, or ``None`` for a new one.
 
     Returns:
@@ -82,59 +80,44 @@ def execute_compiled(
         PlantError: If the simulation is no longer physical.
     """
     rows = np.empty((TICKS_MAX, len(COLUMNS))) if rows is None else rows
-    state, now, done = _begin(plant, setup, job), beginning(), 0
-    while not _finished(now, extract=job.extract):
-        if done >= TICKS_MAX:
-            raise TrialAborted(f"no verdict after {TRIAL_MAX_S:.1f} s: the skill does not end")
-        until = min(done + CHUNK_TICKS, TICKS_MAX)
-        now, done = run_ticks(plant.handles, state, now, job, rows, done, until)
-        plant.check()
-        beat()
-    return now, rows[:done]
-
-
-def execute(
-    plant: Plant, setup: Setup, job: Job, beat: Callable[[], None]
-) -> tuple[Decision, Array]:
-    """Run one trial on any plant, tick by tick; arguments and results as above."""
-    rows = np.empty((TICKS_MAX, len(COLUMNS)))
-    state, now, done = _begin(plant, setup, job), beginning(), 0
-    while not _finished(now, extract=job.extract):
+    state, now, done, noise = begin(plant, setup, job), beginning(), 0, noise_of(setup)
+    while not finished(now, extract=job.extract):
         if done >= TICKS_MAX:
             raise TrialAborted(f"no verdict after {TRIAL_MAX_S:.1f} s: the skill does not end")
         plant.sense(state.percept)
-        now = tick(state, now, job.p, job.limits, job.arm, TICK_S)
-        write_row(rows[done], state, now)
+        now = tick_and_write(state, now, job, noise, rows, done)
         plant.step(state.feel.tau)
         done += 1
-        if done % CHUNK_TICKS == 0:
+        if done % BEAT_TICKS == 0:
             beat()
     return now, rows[:done]
 
 
+def noise_of(setup: Setup) -> Array:
+    """Return what the torque sensors add in each tick ``(ticks, 7)`` [N m]; no rows: nothing."""
+    return np.empty((0, JOINTS)) if setup.noise is None else setup.noise.samples(TICKS_MAX)
+
+
 @compiled
-def run_ticks(
-    handles: Handles,
-    state: State,
-    now: Decision,
-    job: Job,
-    rows: Array,
-    done: int,
-    until: int,
-) -> tuple[Decision, int]:
-    """Run ticks ``done`` to ``until`` or to the end of the skill; return where it stands."""
-    while done < until:
-        begin_tick(handles, state.percept)
-        now = tick(state, now, job.p, job.limits, job.arm, TICK_S)
-        write_row(rows[done], state, now)
-        end_tick(handles, state.feel.tau)
-        done += 1
-        if now.phase == END or (now.verdict != OPEN and not job.extract):
-            break
-    return now, done
+def disturb(percept: Percept, noise: Array, tick: int) -> None:
+    """Add the sensors' error of one tick to the contact torques, if there is any."""
+    if tick < noise.shape[0]:
+        for j in range(JOINTS):
+            percept.contact[j] += noise[tick, j]
 
 
-def _begin(plant: Plant, setup: Setup, job: Job) -> State:
+@compiled
+def tick_and_write(
+    state: State, now: Decision, job: Job, noise: Array, rows: Array, done: int
+) -> Decision:
+    """Run the skill's layers once and write row ``done``; return where the skill stands."""
+    disturb(state.percept, noise, done)
+    now = tick(state, now, job.p, job.limits, job.arm, TICK_S)
+    write_row(rows[done], state, now)
+    return now
+
+
+def begin(plant: Plant, setup: Setup, job: Job) -> State:
     """Reset the plant and check the preconditions."""
     plant.reset(setup)
     state = empty_state()
@@ -148,5 +131,6 @@ def _begin(plant: Plant, setup: Setup, job: Job) -> State:
     return state
 
 
-def _finished(now: Decision, *, extract: bool) -> bool:
+def finished(now: Decision, *, extract: bool) -> bool:
+    """Tell whether a trial is over."""
     return now.phase == END or (now.verdict != OPEN and not extract)

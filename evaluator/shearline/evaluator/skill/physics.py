@@ -16,9 +16,10 @@ import mujoco
 import numpy as np
 
 from shearline.evaluator.base import Array
-from shearline.evaluator.keylock import KeylockTask, draw_setup
-from shearline.evaluator.keylock_spec import level
-from shearline.evaluator.skill.execute import execute_compiled
+from shearline.evaluator.keylock import KeylockTask
+from shearline.evaluator.keylock_draw import draw_setup
+from shearline.evaluator.keylock_variation import level
+from shearline.evaluator.skill.loop import execute_compiled
 from shearline.sims.mujoco_plant import MujocoPlant
 from shearline.sims.panda import JOINTS, LINKS, link_offset, rotation_x
 from shearline.sims.plant import Setup, empty_percept

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from shearline.evaluator.base import Array, Trace
-from shearline.evaluator.keylock import KeylockTask, draw_setup
-from shearline.evaluator.keylock_spec import level
+from shearline.evaluator.keylock import KeylockTask
+from shearline.evaluator.keylock_draw import draw_setup
+from shearline.evaluator.keylock_variation import level
 from shearline.evaluator.skill.baselines import TUPLES, tuple_of
 from shearline.protocol.errors import ShearlineError
 from shearline.sims import render

@@ -38,6 +38,7 @@ class PSP(EpisodicLearner):
     """
 
     fits = True
+    primes = True
 
     def __init__(
         self, space: Space, episode_length: int, seed: int, config: PSPConfig, name: str = "psp"
@@ -51,7 +52,7 @@ class PSP(EpisodicLearner):
         self._belief = Model(self._ledger.trials(), np.zeros(0, dtype=np.bool_))
 
     def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
-        if episode == 0:
+        if episode == 0 and not len(trials):
             self._design = latin_hypercube(rng, self.episode_length, len(self.space))
             return
         self._design = None

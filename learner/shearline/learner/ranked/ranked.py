@@ -34,6 +34,7 @@ class RankedPSP(EpisodicLearner):
 
     name = "psp-ranked"
     fits = True
+    primes = True
 
     def __init__(self, space: Space, episode_length: int, seed: int, config: RankedConfig) -> None:
         super().__init__(space, episode_length, seed)
@@ -43,8 +44,9 @@ class RankedPSP(EpisodicLearner):
         self._wins: Array = np.empty((0, len(space)))
 
     def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
+        del episode
         self._design = latin_hypercube(rng, self.episode_length, len(self.space))
-        if episode:
+        if len(trials):
             self._renew(trials)
 
     def _renew(self, trials: Trials) -> None:
@@ -58,7 +60,7 @@ class RankedPSP(EpisodicLearner):
 
     def _draw(self, index: int, rng: np.random.Generator) -> Array:
         if self.config.refresh and index and index % self.config.refresh == 0:
-            self._renew(self._ledger.trials())
+            self._renew(self._ledger.known(self._ledger.asked // self.episode_length))
         if self._belief is None:
             return self._scout(index, rng)
         return self._belief.first(self._belief.elite.draw(rng, self.config.draws))

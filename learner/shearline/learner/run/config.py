@@ -16,6 +16,7 @@ import tomli_w
 from msgspec import Meta
 
 from shearline.learner.dispatcher.rules import Rules
+from shearline.learner.prior import Prior
 from shearline.protocol.errors import ConfigError
 from shearline.protocol.space import Space
 from shearline.protocol.task import TaskSpec, digest
@@ -45,6 +46,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         confirm: Trials spent on the recommended tuple once the last episode has closed; the
             learner is not told of them.
         confirm_region: Trials spent on draws from the recommended region after those, likewise.
+        warm_start: Trials of another run that the learner starts from.
         record: Whether the run is recorded beside its journal.
         durable: Whether an acknowledged result survives a power cut, not only the process: each
             step of the learner then waits for the disk.
@@ -66,6 +68,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     kinds: tuple[Literal["simulator", "function", "robot"], ...] = ()
     confirm: Annotated[int, Meta(ge=0, le=TRIALS_MAX)] = 0
     confirm_region: Annotated[int, Meta(ge=0, le=TRIALS_MAX)] = 0
+    warm_start: Prior = Prior()
     record: bool = True
     durable: bool = False
 
@@ -99,7 +102,10 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 def to_toml(config: RunConfig) -> str:
     """Write a configuration as TOML that :func:`from_toml` reads back to the same value."""
-    return tomli_w.dumps(msgspec.to_builtins(config))
+    values = msgspec.to_builtins(config)
+    if not config.warm_start:
+        del values["warm_start"]
+    return tomli_w.dumps(values)
 
 
 def from_toml(text: str, task: Callable[[str], TaskSpec] | None = None) -> RunConfig:
@@ -136,7 +142,11 @@ def checked(values: dict[str, Any]) -> RunConfig:
         config = msgspec.convert(values, RunConfig)
     except msgspec.ValidationError as fault:
         raise ConfigError(f"this configuration cannot be run: {fault}") from None
-    Space(config.task.space)
+    space = Space(config.task.space)
+    if any(len(theta) != len(space) for theta in config.warm_start.theta):
+        raise ConfigError(
+            f"this configuration cannot be run: a warm start needs tuples of {len(space)} values"
+        )
     return config
 
 
@@ -151,6 +161,8 @@ def difference(asked: RunConfig, found: RunConfig) -> str:
             return f"its {field} is {was!r}, not {wanted!r}"
     if found.switches != asked.switches:
         return f"its learner has other switches ({', '.join(found.switches) or 'none'})"
+    if found.warm_start != asked.warm_start:
+        return f"it starts from {found.warm_start.run or 'nothing'}, or from other trials of it"
     if digest(found.task) != digest(asked.task):
         return f"its task is {found.task.name!r} with other bounds or options, or another task"
     return ""

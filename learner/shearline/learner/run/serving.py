@@ -13,6 +13,7 @@ from pathlib import Path
 
 from shearline.learner.base import Learner
 from shearline.learner.dispatcher import Dispatcher
+from shearline.learner.episodic import EpisodicLearner
 from shearline.learner.registry import create, resolve
 from shearline.learner.run.config import RunConfig
 from shearline.learner.run.doorman import Doorman
@@ -109,13 +110,16 @@ def _owner(
     on_status: Callable[[Status], None] | None,
 ) -> Owner:
     def make() -> Learner:
-        return create(
+        learner = create(
             config.learner,
             config.space,
             episode_length=config.trials,
             seed=config.seed,
             **config.switches,
         )
+        if config.warm_start and isinstance(learner, EpisodicLearner):
+            learner.prime(config.warm_start)
+        return learner
 
     return Owner(
         config,
