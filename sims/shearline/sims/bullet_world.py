@@ -54,8 +54,8 @@ class BulletSettings:
     substeps: int = 1
     iterations: int = 50
     residual: float = 1e-8
-    stiffness: float = 1e7
-    damping: float = 1e4
+    stiffness: float = 3e7
+    damping: float = 3e4
     near: float = 1e-3
 
     @property

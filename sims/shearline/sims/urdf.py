@@ -2,7 +2,8 @@
 
 The same numbers as in :mod:`shearline.sims.scene`, for an engine that reads URDF. It is in four
 bodies because solving a contact costs with the joints of the bodies that meet in it, whether they
-move or not. What may touch what is decided by link: the blade, which meets the walls, is a part of
+move or not. There is nothing to see in it: pictures are drawn from the scene, whatever simulates
+it. What may touch what is decided by link: the blade, which meets the walls, is a part of
 the hand, and the bitting, which meets the pins, one of the key.
 """
 
@@ -13,7 +14,7 @@ import math
 import numpy as np
 
 from shearline.sims import panda
-from shearline.sims.lock import Box, Key, Lock, Pin, Triple, blade, body, walls
+from shearline.sims.lock import Box, Key, Lock, Pin, Triple, blade, walls
 from shearline.sims.panda import Link
 from shearline.sims.scene import KEY_INERTIA, KEY_MASS, KEY_TURN, TIP_M, Scene
 
@@ -33,8 +34,6 @@ SPECK_M = 0.1
 _ASKEW: Triple = (0.0, math.pi / 4.0, -math.asin(1.0 / math.sqrt(3.0)))
 
 _ZERO: Triple = (0.0, 0.0, 0.0)
-_BRASS, _STEEL = (0.70, 0.55, 0.26), (0.58, 0.61, 0.66)
-_WHITE, _RED = (0.93, 0.94, 0.95), (0.85, 0.35, 0.22)
 
 #: How the fingers stand on the flange.
 _HAND_TURN = -math.pi / 4.0
@@ -86,7 +85,7 @@ def rotors() -> str:
 
 def lock_walls(scene: Scene) -> str:
     """Return the lock without its pins; it stands where the lock's frame stands."""
-    boxes = (_touched(box, _BRASS) for box in walls(scene.lock))
+    boxes = (_collision(_box(box), box.centre, _turns(box)) for box in walls(scene.lock))
     return _robot("walls", [_link("walls", _anchor(), *boxes)])
 
 
@@ -127,9 +126,7 @@ def _arm_joint(parent: str, link: Link) -> str:
 
 
 def _arm_link(link: Link) -> str:
-    radius = 0.058 if link.torque_max > 50.0 else 0.048
-    drum = f'<cylinder radius="{radius!r}" length="0.12"/>'
-    return _link(link.name, _inertial(link.mass, link.centre, link.inertia), _seen(drum, _WHITE))
+    return _link(link.name, _inertial(link.mass, link.centre, link.inertia))
 
 
 def _hand(key: Key) -> str:
@@ -137,12 +134,10 @@ def _hand(key: Key) -> str:
     outline = blade(key)
     centre = (0.0, 0.0, TIP_M + outline.centre[2])
     turn = KEY_TURN - _HAND_TURN
-    palm = '<box size="0.04 0.18 0.06"/>'
     return _link(
         "hand",
         _inertial(panda.HAND_MASS, panda.HAND_CENTRE, panda.HAND_INERTIA),
         _collision(_box(outline), centre, (0.0, 0.0, turn)),
-        _seen(palm, _WHITE, (0.0, 0.0, 0.03)),
     )
 
 
@@ -152,7 +147,6 @@ def _key(key: Key) -> str:
         _inertial(KEY_MASS, (0.0, 0.0, -key.length_m), KEY_INERTIA),
         _collision(f'<mesh filename="{BITTING_MESH}"/>', turn=_ASKEW, concave=True),
         _speck(-SPECK_M),
-        *(_seen(_box(box), _STEEL, box.centre, _turns(box)) for box in body(key)),
     )
 
 
@@ -175,7 +169,6 @@ def _pin_link(pin: Pin, lock: Lock) -> str:
         _inertial(lock.pin_mass, middle, (inertia,) * 3),
         _collision(shape, middle, along_y),
         _speck(SPECK_M),
-        _seen(shape, _RED, middle, along_y),
     )
 
 
@@ -221,25 +214,11 @@ def _inertial(mass: float, centre: Triple, inertia: tuple[float, ...]) -> str:
     )
 
 
-def _touched(box: Box, colour: Triple) -> str:
-    """Return a box that is seen and collides."""
-    shape, turns = _box(box), _turns(box)
-    return _collision(shape, box.centre, turns) + _seen(shape, colour, box.centre, turns)
-
-
 def _collision(
     shape: str, at: Triple = _ZERO, turn: Triple = _ZERO, *, concave: bool = False
 ) -> str:
     kind = ' concave="yes"' if concave else ""
     return f"<collision{kind}>{_origin(at, turn)}<geometry>{shape}</geometry></collision>\n"
-
-
-def _seen(shape: str, colour: Triple, at: Triple = _ZERO, turn: Triple = _ZERO) -> str:
-    rgba = " ".join(map(str, (*colour, 1)))
-    return (
-        f"<visual>{_origin(at, turn)}<geometry>{shape}</geometry>"
-        f'<material name="m{rgba.replace(" ", "_")}"><color rgba="{rgba}"/></material></visual>\n'
-    )
 
 
 def _box(box: Box) -> str:

@@ -198,6 +198,7 @@ def test_a_lost_trial_can_be_looked_at_but_not_verified(
         (["--trial", "0", "--with", "x0"], "NAME=VALUE"),
         (["--trial", "0", "--with", "x0=1", "--verify"], "cannot come out the same"),
         (["--trial", "0", "--seed", "1", "--verify"], "cannot come out the same"),
+        (["--trial", "0", "--plant", "pybullet", "--verify"], "the plant that is on record"),
         (["--all", "--verify", "--save", "x.rrd"], "name it with --trial"),
         (["--trial", "0", "--workers", "2"], "add --all"),
         (["--trial", "0", "--video", "x.gif"], "end in .mp4"),

@@ -127,6 +127,11 @@ def test_another_engine_is_named(keylock: KeylockTask, recorded: Case) -> None:
     assert same.why.startswith("the engine is not the same")
 
 
+def test_a_case_names_the_plant_it_was_tried_on(recorded: Case) -> None:
+    assert recorded.plant == "mujoco"
+    assert with_outcome(recorded, engine="pybullet 3.2.7 model 0a skill 1").plant == "pybullet"
+
+
 def test_another_task_is_named_by_what_differs(recorded: Case) -> None:
     limited = KeylockTask("keylock-limit")
     case = with_sample(recorded, "depth", 5)

@@ -16,10 +16,10 @@ import mujoco
 import numpy as np
 
 from shearline.evaluator.base import Array
-from shearline.evaluator.keylock import KeylockTask
+from shearline.evaluator.keylock import BulletKeylockTask, KeylockTask
 from shearline.evaluator.keylock_draw import draw_setup
 from shearline.evaluator.keylock_variation import level
-from shearline.evaluator.skill.loop import execute_compiled
+from shearline.evaluator.plants import DEFAULT, PLANTS
 from shearline.sims.mujoco_plant import MujocoPlant
 from shearline.sims.panda import JOINTS, LINKS, link_offset, rotation_x
 from shearline.sims.plant import Setup, empty_percept
@@ -29,7 +29,7 @@ from shearline.sims.scene import KEY_TURN, Scene, Settings, tip_pose
 REFERENCE_STEP_S = 125e-6
 
 
-def random_tuples(task: KeylockTask, count: int, seed: int = 0) -> Array:
+def random_tuples(task: KeylockTask | BulletKeylockTask, count: int, seed: int = 0) -> Array:
     """Return tuples ``(count, 23)``, uniform over the task's bounds."""
     bounds = np.array([(low, high) for _, low, high in task.spec.space.values()])
     uniform = np.random.default_rng(seed).uniform(size=(count, len(bounds)))
@@ -50,7 +50,9 @@ def verdict_agreement(tuples: int, step_s: float = Settings().timestep_s) -> flo
     return same / tuples
 
 
-def penetrations(trials: int, first_seed: int = 0) -> Iterator[tuple[float, float]]:
+def penetrations(
+    trials: int, first_seed: int = 0, task: KeylockTask | BulletKeylockTask | None = None
+) -> Iterator[tuple[float, float]]:
     """Yield how deep the blade was in the walls of the keyway, for each trial [m].
 
     Measured from the geometry of the trace, not from the solver's own account: positive where a
@@ -60,10 +62,10 @@ def penetrations(trials: int, first_seed: int = 0) -> Iterator[tuple[float, floa
     Yields:
         The deepest along x and along y.
     """
-    task = KeylockTask()
+    task = task or KeylockTask()
     for i, theta in enumerate(random_tuples(task, trials, first_seed)):
         setup, _ = draw_setup(level("keylock"), first_seed + i)
-        _, rows = execute_compiled(task.plant, setup, task.job(theta), lambda: None)
+        _, rows = task.execute(setup, task.job(theta), lambda: None)
         yield penetration(task.plant.scene, setup, rows)
 
 
@@ -172,9 +174,11 @@ def main(arguments: list[str] | None = None) -> int:
     """Print the proofs as one JSON object and return an exit code."""
     parser = argparse.ArgumentParser(description="Prove the physics of the key-in-lock task.")
     parser.add_argument("--tuples", type=int, default=50, help="tuples to compare step sizes with")
+    parser.add_argument("--plant", choices=PLANTS, default=DEFAULT, help="measure penetration on")
     parser.add_argument("--trials", type=int, default=1000, help="trials to measure penetration in")
     options = parser.parse_args(arguments)
-    deep = np.array(list(penetrations(options.trials)))
+    task = BulletKeylockTask() if options.plant == "pybullet" else KeylockTask()
+    deep = np.array(list(penetrations(options.trials, task=task)))
     lock = Scene().lock
     found = {
         "verdict_agreement": verdict_agreement(options.tuples),
