@@ -58,7 +58,10 @@ class Adversary:
         self.world.clock.after(back_s, lambda: revive(evaluator))
 
     def _kill_for_good(self, evaluator: SimEvaluator, _back_s: float) -> None:
-        if sum(e.alive for e in self.world.evaluators.values()) > 1:
+        """One must live that may run whatever the run still wants."""
+        wanted = self.world.rules.confirm_on
+        others = [e for e in self.world.evaluators.values() if e is not evaluator and e.alive]
+        if any(wanted in {"", e.kind} for e in others):
             evaluator.kill()
 
     def _freeze(self, evaluator: SimEvaluator, back_s: float) -> None:
@@ -179,10 +182,11 @@ class Adversary:
             world.clock.after(wait_s, lambda: world.hear(resume))
 
     def _supervise(self) -> None:
-        """See to it that one evaluator lives, as whoever wants the run to end would."""
-        evaluators = list(self.world.evaluators.values())
-        if not any(e.alive and not e.hung for e in evaluators):
-            evaluator = self.rng.choice(evaluators)
+        """See to it that one evaluator lives that may run what is left, as its owner would."""
+        wanted = self.world.rules.confirm_on
+        able = [e for e in self.world.evaluators.values() if wanted in {"", e.kind}]
+        if not any(e.alive and not e.hung for e in able):
+            evaluator = self.rng.choice(able)
             evaluator.kill()
             evaluator.start()
         self.world.clock.after(5.0, self._supervise)

@@ -124,5 +124,6 @@ PLANTS: Mapping[str, Plant] = {
     "reviving what was given out again": Plant({(results, "_is_revivable"): _revive_anything}),
     "the clock believed": Plant({(desk.Desk, "look"): _believe_the_clock}),
     "learning from confirmations": Plant({(book.Book, "_open"): _learn_from_everything}),
+    "confirming on anyone": Plant({(handout, "_admits"): _yes}),
     "copies for anyone": Plant({(handout, "_copy"): _copy_to_anyone}),
 }

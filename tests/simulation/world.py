@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import random
+from dataclasses import replace
 
 from simulation.adversary import Adversary, revive
 from simulation.evaluators import LEASE_S, SimEvaluator
@@ -58,8 +59,7 @@ class World:
         self.plant = plant
         self.clock = Clock()
         self.network = Network(self.clock, self.rng)
-        self.rules = self._rules(seed)
-        self.promises = Promises(self.rules)
+        rules = self._rules(seed)
         self.finished: EndRun | None = None
         self.up = self.frozen = self.stopped = False
         self.life = 0
@@ -73,6 +73,11 @@ class World:
         }
         for evaluator in self.evaluators.values():
             evaluator.learner = self
+        confirm_on = random.Random(f"confirm on {seed}").choice(
+            ("", "", *(e.kind for e in self.evaluators.values()))
+        )
+        self.rules = replace(rules, confirm_on=confirm_on)
+        self.promises = Promises(self.rules)
 
     def _rules(self, seed: int) -> Rules:
         # From a generator of its own: what a seed meant before there were confirmations, it means.

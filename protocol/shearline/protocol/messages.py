@@ -235,7 +235,8 @@ class Proposed(Message, frozen=True, kw_only=True, tag="proposed"):
 class Counted(Message, frozen=True, kw_only=True, tag="counted"):
     """A trial reached its one outcome (or was lost: ``kind`` is then ``None``).
 
-    Times are the learner's clock [s since the epoch].
+    ``evaluator_kind`` is what its evaluator said it is, ``""`` in runs of earlier versions. Times
+    are the learner's clock [s since the epoch].
     """
 
     trial: Count
@@ -254,6 +255,7 @@ class Counted(Message, frozen=True, kw_only=True, tag="counted"):
     extras: Annotated[dict[str, float], Meta(max_length=64)]
     at_s: Seconds
     purpose: Purpose = Purpose.LEARNING
+    evaluator_kind: Annotated[str, Meta(max_length=32)] = ""
 
 
 # Journals hold this one as well: what has its default is left out, so that they stay as they were.

@@ -141,8 +141,9 @@ class Run:
     def trials(self) -> Iterator[dict[str, Any]]:
         """Yield one plain row per trial that reached its outcome, in order of trial number.
 
-        Keys: ``trial, episode, theta`` (by name), ``outcome, cost, success, evaluator, attempts,
-        seed, engine, digest, wall_s, late, why, extras, purpose``. A lost trial has no cost.
+        Keys: ``trial, episode, theta`` (by name), ``outcome, cost, success, evaluator,
+        evaluator_kind, attempts, seed, engine, digest, wall_s, late, why, extras, purpose``. A
+        lost trial has no cost.
         """
         for outcome in self.outcomes:
             yield _row(outcome, self.parameters)
@@ -354,6 +355,7 @@ def _row(outcome: Counted, names: list[str]) -> dict[str, Any]:
         "cost": outcome.cost if outcome.kind else None,
         "success": outcome.kind is OutcomeKind.SUCCESS,
         "evaluator": outcome.evaluator,
+        "evaluator_kind": outcome.evaluator_kind,
         "attempts": outcome.attempts,
         "seed": outcome.seed,
         "engine": outcome.engine,

@@ -26,10 +26,10 @@ class Table(Mapping[str, Column]):
     """One row per trial that reached its outcome, in order of trial number.
 
     A mapping of column names to arrays ``(trials,)``, so that ``pandas.DataFrame(dict(table))``
-    is a data frame. Columns are ``trial, episode, outcome, success, cost, evaluator, attempts,
-    seed, engine, digest, wall_s, late, why, at_s, purpose``, then ``theta.NAME`` for each
-    parameter and ``extras.NAME`` for each further number. What a trial does not have is ``nan``:
-    the cost of a lost one, an extra that only others said.
+    is a data frame. Columns are ``trial, episode, outcome, success, cost, evaluator,
+    evaluator_kind, attempts, seed, engine, digest, wall_s, late, why, at_s, purpose``, then
+    ``theta.NAME`` for each parameter and ``extras.NAME`` for each further number. What a trial
+    does not have is ``nan``: the cost of a lost one, an extra that only others said.
 
     Attributes:
         columns: Name to values.
@@ -88,6 +88,7 @@ def _facts(outcomes: Sequence[Counted]) -> dict[str, Column]:
         "success": np.array([kind is OutcomeKind.SUCCESS for kind in kinds], dtype=np.bool_),
         "cost": np.array(costs, dtype=np.float64),
         "evaluator": _column(outcomes, "evaluator", np.str_),
+        "evaluator_kind": _column(outcomes, "evaluator_kind", np.str_),
         "attempts": _column(outcomes, "attempts", np.int64),
         "seed": _column(outcomes, "seed", np.int64),
         "engine": _column(outcomes, "engine", np.str_),

@@ -201,3 +201,62 @@ def test_a_status_counts_what_follows_the_last_episode() -> None:
     lab = learned(confirm=3, confirm_region=2)
     now = status(lab.dispatcher, run="r", learner="lhs", vitals=Vitals())
     assert (now.episodes, now.trials_per_episode, now.confirming) == (1, 2, 5)
+
+
+# -- on evaluators of one kind ---------------------------------------------------------------------
+
+
+def on_robots() -> Lab:
+    """Return a run of a function that is to be confirmed on robots, asking for that."""
+    return learned(confirm_on="robot", confirm_region=1)
+
+
+def test_what_is_to_be_confirmed_on_robots_waits_for_one() -> None:
+    lab = on_robots()
+    assert "the confirmation waits for a robot" in said(answer(lab))
+    lab.wait(60.0, "a")
+    assert not lab.holds("a")
+    assert lab.dispatcher.state == "running"
+
+
+def test_a_robot_that_comes_gets_it_and_nobody_else() -> None:
+    lab = on_robots()
+    answer(lab)
+    lab.hello("arm", kind="robot", credits=1)
+    assert lab.holds("arm") == [2]
+    lab.credit("a")
+    lab.wait(4.0, "a", "arm")
+    assert not lab.holds("a")
+
+
+def test_a_trial_that_failed_on_the_only_robot_goes_back_to_it() -> None:
+    lab = on_robots()
+    lab.hello("arm", kind="robot", credits=1)
+    answer(lab)
+    (token,) = lab.dispatcher.book.held_by["arm"]
+    lab.result("arm", token, OutcomeKind.ABORTED, why="user stop")
+    lab.wait(4.0, "a", "arm")
+    lab.finish("arm")
+    assert lab.dispatcher.book.tally.counted == 2 + 3
+
+
+def test_draws_from_the_region_are_for_anybody() -> None:
+    lab = on_robots()
+    lab.hello("arm", kind="robot", credits=1)
+    answer(lab)
+    lab.finish("arm")
+    answer(lab)
+    lab.finish("a")
+    lab.finish("arm")
+    assert ending(lab).ending is Ending.COMPLETE
+
+
+def test_every_outcome_says_what_kind_of_evaluator_it_came_from() -> None:
+    lab = on_robots()
+    lab.hello("arm", kind="robot", credits=1)
+    answer(lab)
+    lab.finish("arm")
+    kinds = {m.trial: m.evaluator_kind for m in published(lab.out, Counted)}
+    assert kinds == {0: "function", 1: "function", 2: "robot", 3: "robot", 4: "robot"}
+    again = {m.trial: m.evaluator_kind for m in history(lab.journal) if isinstance(m, Counted)}
+    assert again == kinds

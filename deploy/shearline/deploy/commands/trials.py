@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shearline.deploy.exits import Exit
 from shearline.deploy.options import Subparsers, add_json
@@ -64,5 +65,11 @@ def _print_table(run: Run) -> None:
         cost = "-" if row["cost"] is None else f"{row['cost']:.4g}"
         print(
             f"{row['trial']:>5} {row['episode'] + 1:>7}  {row['outcome']:<8} {cost:>9}"
-            f" {row['attempts']:>8}  {row['evaluator']} {row['why']}"
+            f" {row['attempts']:>8}  {_who(row)} {row['why']}"
         )
+
+
+def _who(row: Mapping[str, Any]) -> str:
+    """Return the evaluator, and its kind where that is not the usual one."""
+    usual = row["evaluator_kind"] in {"", "simulator", "function"}
+    return f"{row['evaluator']}" if usual else f"{row['evaluator']} ({row['evaluator_kind']})"

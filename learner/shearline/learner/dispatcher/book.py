@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from msgspec import UNSET, UnsetType
+
 from shearline.learner.dispatcher.entries import (
     AttemptIssued,
     AttemptLapsed,
@@ -82,6 +84,7 @@ class AttemptRow:
     copy: bool
     state: AttemptState = AttemptState.LEASED
     overdue: bool = False
+    kind: str | UnsetType = UNSET
 
 
 @dataclass(slots=True)
@@ -188,6 +191,7 @@ class Book:
         attempt = AttemptRow(
             entry.token, entry.trial, entry.attempt, entry.evaluator, entry.boot, entry.copy
         )
+        attempt.kind = entry.kind
         self.attempts[entry.token] = attempt
         self._go_live(attempt, trial)
 

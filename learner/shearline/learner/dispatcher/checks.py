@@ -93,3 +93,5 @@ def _check_live(desk: Desk) -> None:
             f"trial {trial.number} is copied on a robot"
         )
         assert trial.attempts <= ATTEMPTS_MAX
+        kind, purpose = attempt.kind or "", book.purposes[trial.episode]
+        assert desk.rules.admits(purpose, kind), f"trial {trial.number} is not for a {kind!r}"

@@ -174,6 +174,7 @@ class Desk:
                 evaluator=evaluator.name,
                 boot=evaluator.boot,
                 copy=copy,
+                kind=evaluator.kind,
             )
         )
         self.leases[token] = Lease(

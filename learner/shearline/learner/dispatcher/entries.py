@@ -67,7 +67,10 @@ class ConfirmationProposed(TrialsProposed, frozen=True, kw_only=True, tag="confi
 
 
 class AttemptIssued(Entry, frozen=True, kw_only=True, tag="issued"):
-    """A trial is about to be handed to an evaluator; ``copy`` if another attempt is live."""
+    """A trial is about to be handed to an evaluator; ``copy`` if another attempt is live.
+
+    ``kind`` is the evaluator's. Journals of earlier versions lack it and stay as they were.
+    """
 
     trial: int
     attempt: int
@@ -75,6 +78,7 @@ class AttemptIssued(Entry, frozen=True, kw_only=True, tag="issued"):
     evaluator: str
     boot: str
     copy: bool
+    kind: str | msgspec.UnsetType = msgspec.UNSET
 
 
 class AttemptLapsed(Entry, frozen=True, kw_only=True, tag="lapsed"):

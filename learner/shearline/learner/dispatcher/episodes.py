@@ -56,7 +56,16 @@ def propose(desk: Desk, event: ProposalsReady) -> None:
     desk.asking = None
     desk.journal(_opened(desk, event))
     desk.opened_s = desk.clock_s
+    _say_who_is_missing(desk, event.episode)
     settle(desk)  # nothing to confirm is confirmed at once
+
+
+def _say_who_is_missing(desk: Desk, episode: int) -> None:
+    """Say for whom an episode waits, if nobody of that kind is there."""
+    purpose, kind = desk.book.purposes[episode], desk.rules.confirm_on
+    there = any(desk.rules.admits(purpose, e.kind) for e in desk.roster.ready(desk.clock_s))
+    if kind and purpose is Purpose.CONFIRMATION and not there:
+        desk.say(f"the confirmation waits for a {kind}: start one, or stop the run")
 
 
 def _opened(desk: Desk, event: ProposalsReady) -> TrialsProposed:

@@ -2,7 +2,8 @@
 
 Prefetching stops when fewer trials are pending than evaluators could start at once, so that the
 end of an episode is not spent waiting for a queue behind one busy evaluator. A trial that failed
-on an evaluator goes to another one if there is any.
+on an evaluator goes to another one if there is any. What confirms may be meant for evaluators of
+one kind; the others then get none of it, however long it waits.
 """
 
 from __future__ import annotations
@@ -75,7 +76,8 @@ def _copy(desk: Desk, attempt: AttemptRow, idle: list[Evaluator]) -> None:
     if len(trial.live) > 1 or trial.state not in UNSETTLED or owner is None or owner.is_robot():
         return
     for evaluator in idle:
-        if evaluator.name != attempt.evaluator and evaluator.name not in trial.failed_on:
+        fresh = evaluator.name != attempt.evaluator and evaluator.name not in trial.failed_on
+        if fresh and _admits(desk, trial, evaluator):
             desk.issue(trial, evaluator, copy=True)
             idle.remove(evaluator)
             return
@@ -95,10 +97,18 @@ def _match(desk: Desk, evaluator: Evaluator) -> TrialRow | None:
     others: list[str] | None = None
     for number in islice(desk.book.pending, _MATCH_MAX):
         trial = trials[number]
+        if not _admits(desk, trial, evaluator):
+            continue
         if name not in trial.failed_on:
             return trial
         if others is None:
-            others = [e.name for e in desk.roster.ready(desk.clock_s) if e is not evaluator]
+            ready = [e for e in desk.roster.ready(desk.clock_s) if e is not evaluator]
+            others = [e.name for e in ready if _admits(desk, trial, e)]
         if all(other in trial.failed_on for other in others):
             return trial
     return None
+
+
+def _admits(desk: Desk, trial: TrialRow, evaluator: Evaluator) -> bool:
+    """Tell whether a trial is meant for evaluators of this kind."""
+    return desk.rules.admits(desk.book.purposes[trial.episode], evaluator.kind)

@@ -62,7 +62,8 @@ def _of_result(book: Book, entry: ResultTaken) -> list[Message]:
     if entry.verdict not in {Verdict.COUNTED, Verdict.LATE}:
         return []
     result = entry.result
-    trial = book.trials[book.attempts[result.token].trial]
+    attempt = book.attempts[result.token]
+    trial = book.trials[attempt.trial]
     return [
         Counted(
             trial=trial.number,
@@ -81,6 +82,7 @@ def _of_result(book: Book, entry: ResultTaken) -> list[Message]:
             extras=result.extras,
             at_s=entry.at_s,
             purpose=book.purposes[trial.episode],
+            evaluator_kind=attempt.kind or "",
         )
     ]
 

@@ -52,6 +52,7 @@ class Rules:
         stop_grace_s: How long a stop waits for what runs [s].
         kinds: Kinds of evaluators that may take part; all if empty.
         confirm: Trials of the recommended tuple once the last episode has closed.
+        confirm_on: Kind of evaluators that alone may run those, any if empty.
         confirm_region: Trials of tuples drawn from the recommended region, after those.
     """
 
@@ -67,7 +68,12 @@ class Rules:
     stop_grace_s: float = 5.0
     kinds: tuple[str, ...] = ()
     confirm: int = 0
+    confirm_on: str = ""
     confirm_region: int = 0
+
+    def admits(self, purpose: Purpose, kind: str) -> bool:
+        """Tell whether evaluators of a kind may run trials of a purpose."""
+        return purpose is not Purpose.CONFIRMATION or self.confirm_on in {"", kind}
 
     def agenda(self, episode: int) -> tuple[Purpose, int] | None:
         """Return what an episode is for and how many trials it has; ``None`` behind the last."""

@@ -45,6 +45,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         kinds: Kinds of evaluators that may take part; all if empty.
         confirm: Trials spent on the recommended tuple once the last episode has closed; the
             learner is not told of them.
+        confirm_on: Kind of evaluators that alone confirm; any if empty.
         confirm_region: Trials spent on draws from the recommended region after those, likewise.
         warm_start: Trials of another run that the learner starts from.
         record: Whether the run is recorded beside its journal.
@@ -67,6 +68,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     stop_grace_s: Annotated[float, Meta(ge=0.0, le=3600.0)] = 5.0
     kinds: tuple[Literal["simulator", "function", "robot"], ...] = ()
     confirm: Annotated[int, Meta(ge=0, le=TRIALS_MAX)] = 0
+    confirm_on: Literal["", "simulator", "function", "robot"] = ""
     confirm_region: Annotated[int, Meta(ge=0, le=TRIALS_MAX)] = 0
     warm_start: Prior = Prior()
     record: bool = True
@@ -96,6 +98,7 @@ class RunConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             stop_grace_s=self.stop_grace_s,
             kinds=self.kinds,
             confirm=self.confirm,
+            confirm_on=self.confirm_on,
             confirm_region=self.confirm_region,
         )
 
@@ -147,6 +150,11 @@ def checked(values: dict[str, Any]) -> RunConfig:
         raise ConfigError(
             f"this configuration cannot be run: a warm start needs tuples of {len(space)} values"
         )
+    if config.confirm_on and config.kinds and config.confirm_on not in config.kinds:
+        raise ConfigError(
+            f"only evaluators of kind {', '.join(config.kinds)} may take part, so none of kind"
+            f" {config.confirm_on} could confirm: correct kinds or confirm_on"
+        )
     return config
 
 
@@ -155,7 +163,15 @@ def difference(asked: RunConfig, found: RunConfig) -> str:
 
     What only decides how it is run (leases, speculation, record) may change at a resume.
     """
-    for field in ("learner", "episodes", "trials", "seed", "confirm", "confirm_region"):
+    for field in (
+        "learner",
+        "episodes",
+        "trials",
+        "seed",
+        "confirm",
+        "confirm_on",
+        "confirm_region",
+    ):
         was, wanted = getattr(found, field), getattr(asked, field)
         if was != wanted:
             return f"its {field} is {was!r}, not {wanted!r}"
