@@ -22,6 +22,9 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 HOLDS_TERMINAL = re.compile(r"^(shearline (?:learner|evaluator) [^&\n]*[^&\s])\s*$", re.MULTILINE)
+#: What a reader types at a robot's terminal; the terminal stays open behind it.
+AT_THE_ROBOT = re.compile(r"^(shearline evaluator [^&|\n]*--robot [^&|\n]*)$", re.MULTILINE)
+TYPED = "< <(echo confirm; exec sleep 60 2>/dev/null)"
 PATIENCE_S = 120
 #: Pages whose Python needs more around it than a folder, and the tests that run it.
 PYTHON_ELSEWHERE = {
@@ -36,6 +39,7 @@ def blocks(page: Path) -> list[tuple[str, str]]:
 
 def script(text: str, port: str) -> str:
     text = text.replace("LEARNER", "127.0.0.1").replace("7447", port)
+    text = AT_THE_ROBOT.sub(rf"\1 {TYPED}", text)
     return "set -e\n" + HOLDS_TERMINAL.sub(r"\1 &", text) + "\nwait\n"
 
 

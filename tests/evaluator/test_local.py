@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shearline.evaluator.base import Array, Outcome, Trace
+from shearline.evaluator.base import Array, Outcome, Trace, TrialRejected
 from shearline.evaluator.builtin import BowlTask
 from shearline.evaluator.local import EXTRAS_MAX, objection, run_trial, trace_data
 from shearline.protocol.codec import decode, encode
@@ -95,3 +95,14 @@ def test_columns_of_different_lengths_are_refused() -> None:
     trace = Trace(np.zeros(3, np.float32), {"x": ("m", np.zeros(2, np.float32))})
     with pytest.raises(ValueError, match="same shape"):
         trace_data(trace, 0, "token-01")
+
+
+def test_a_tuple_that_the_task_itself_rejects_is_rejected() -> None:
+    class Narrow(BowlTask):
+        def run(self, theta: Array, seed: int, beat: Callable[[], None]) -> Outcome:
+            del theta, seed, beat
+            raise TrialRejected("x = 4 m is outside this lab's [0, 1]")
+
+    verdict = run_trial(Narrow(1), [4.0, 0.0], 1)
+    assert verdict.kind is OutcomeKind.REJECTED
+    assert "this lab" in verdict.why

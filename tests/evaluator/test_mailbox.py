@@ -19,6 +19,7 @@ from evaluator.mail_kit import (
     trial,
     welcome,
 )
+from msgspec.structs import replace
 
 from shearline.evaluator.mail import (
     Abort,
@@ -33,8 +34,10 @@ from shearline.evaluator.mail import (
     Prepare,
     Quit,
     Ready,
+    Resting,
     Run,
     Send,
+    Settled,
     Started,
     Tick,
 )
@@ -347,3 +350,33 @@ def test_after_the_end_nothing_is_done() -> None:
 def test_a_long_reason_can_be_said() -> None:
     out = joined().handle(Leave(4, "x" * 9999), 1.0)
     assert all(encode(i.message) for i in of(out, Send))
+
+
+# -- tasks on hardware -----------------------------------------------------------------------------
+
+
+def test_a_task_that_rests_has_no_credit_until_it_is_ready_again() -> None:
+    box = joined()
+    assert [credit.credits for credit in said(box.handle(Resting(), 1.0), Credit)] == [0]
+    assert of(box.handle(Heard(trial(1)), 1.1), Run) == []
+    ready = box.handle(Ready("e", ""), 2.0)
+    assert [credit.credits for credit in said(ready, Credit)] == [2]
+
+
+def test_what_earlier_lives_owed_is_sent_under_this_boot_until_it_is_acknowledged() -> None:
+    box = mailbox()
+    box.keeps = True
+    box.owe([replace(result(7), boot="boot-of-before")])
+    box.handle(LearnerAlive(1), 0.0)
+    sent = said(box.handle(welcome(), 0.1), Result)
+    assert [(r.boot, r.token) for r in sent] == [(BOOT, token(7))]
+    assert len(said(box.handle(Tick(), 1.0), Result)) == 1
+    assert of(box.handle(ack(7), 1.1), Settled) == [Settled(token(7))]
+    assert said(box.handle(Tick(), 9.0), Result) == []
+
+
+def test_nobody_hears_what_is_settled_where_nobody_keeps_results() -> None:
+    box = joined()
+    box.handle(Heard(trial(1)), 0.5)
+    box.handle(Ended(result(1)), 0.6)
+    assert of(box.handle(ack(1), 0.7), Settled) == []

@@ -48,6 +48,16 @@ def seconds(text: str) -> float:
     return value
 
 
+def kind_and_number(text: str) -> tuple[str, int]:
+    """Parse ``KIND:N``: a kind of evaluators and a whole number of at least 1."""
+    kind, _, number = text.partition(":")
+    if kind not in {"simulator", "function", "robot"} or not number:
+        raise argparse.ArgumentTypeError(
+            f"expected simulator:N, function:N or robot:N, got {text!r}"
+        )
+    return kind, positive(number)
+
+
 def add_json(command: argparse.ArgumentParser) -> None:
     """``--json``: print for programs instead of people."""
     command.add_argument("--json", action="store_true", help="print JSON for programs")
@@ -115,6 +125,12 @@ def add_run(command: argparse.ArgumentParser) -> None:
         help="then try the recommended tuple N times on fresh noise, and say how often it worked",
     )
     group.add_argument(
+        "--confirm-on",
+        type=kind_and_number,
+        metavar="KIND:N",
+        help="as --confirm N, but on evaluators of one kind only, e.g. robot:20",
+    )
+    group.add_argument(
         "--confirm-region",
         type=at_least(0),
         metavar="N",
@@ -145,6 +161,7 @@ def run_arguments(arguments: argparse.Namespace) -> list[str]:
         "--trials": arguments.trials,
         "--seed": arguments.seed,
         "--confirm": arguments.confirm,
+        "--confirm-on": ":".join(map(str, arguments.confirm_on or ())) or None,
         "--confirm-region": arguments.confirm_region,
         "--warm-start": arguments.warm_start,
         "--lease": arguments.lease,

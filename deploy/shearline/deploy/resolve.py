@@ -66,6 +66,10 @@ def resolve_run(arguments: argparse.Namespace) -> Asked:
         for name, field in OVERRIDES.items()
         if getattr(arguments, name) is not None
     }
+    if arguments.confirm_on is not None:
+        if arguments.confirm is not None:
+            raise ConfigError("--confirm-on says how many, too: leave --confirm out")
+        values["confirm_on"], values["confirm"] = arguments.confirm_on
     if arguments.task is not None:
         values["task"] = arguments.task
     if arguments.no_record:

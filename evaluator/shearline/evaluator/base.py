@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from shearline.protocol.errors import ShearlineError
+from shearline.protocol.messages import Result, Trial
 from shearline.protocol.pose import Placed
 from shearline.protocol.task import TaskSpec
 
@@ -24,6 +25,10 @@ Array = npt.NDArray[np.float64]
 
 class TrialAborted(ShearlineError):  # noqa: N818 - an abort is an outcome, not a mistake
     """The trial ended without a verdict (engine, robot or operator); it never becomes a cost."""
+
+
+class TrialRejected(TrialAborted):
+    """What runs the trial does not allow this tuple, and has not begun with it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,4 +99,58 @@ class Task(Protocol):
         Raises:
             TrialAborted: If no verdict was reached.
         """
+        ...
+
+
+class Outstanding(Protocol):
+    """Results that a run has not acknowledged, kept by whoever measured them."""
+
+    def pending(self, run: str) -> list[Result]:
+        """Return what a run has not acknowledged, oldest first."""
+        ...
+
+    def drop(self, token: str) -> None:
+        """Forget a result: the learner has it, or never wants it."""
+        ...
+
+
+@runtime_checkable
+class Attended(Protocol):
+    """A task on hardware: a person decides when trials may come, and results are too dear to lose.
+
+    Beside this it is a :class:`Task`; tasks that are not attended need none of it.
+    """
+
+    @property
+    def kind(self) -> str:
+        """What the evaluator calls itself, ``"robot"``."""
+        ...
+
+    @property
+    def spool(self) -> Outstanding:
+        """Results of this hardware that may still be owed, also of earlier processes."""
+        ...
+
+    def join(
+        self,
+        ready: Callable[[bool], None],
+        over: Callable[[int, str], None],
+        look: Callable[[], tuple[bool, bool]],
+    ) -> None:
+        """Be given a worker, before anything else.
+
+        Args:
+            ready: To be called, from any thread, when trials may come or may not any more.
+            over: To be called, from any thread, with an exit code and a sentence when nothing
+                more will come of this hardware in this process.
+            look: Tells whether the learner can be reached, and whether the run is held.
+        """
+        ...
+
+    def announce(self, run: str, trial: Trial) -> None:
+        """Be told which attempt of which run the next ``run`` is for."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the hardware in good order."""
         ...

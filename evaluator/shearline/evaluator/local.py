@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from shearline.evaluator.base import Outcome, Task, Trace, TrialAborted
+from shearline.evaluator.base import Outcome, Task, Trace, TrialAborted, TrialRejected
 from shearline.protocol.messages import OutcomeKind, TraceData, clip
 from shearline.protocol.space import Space
 
@@ -71,6 +71,8 @@ def run_trial(
     start_s = time.perf_counter()
     try:
         outcome = task.run(values, seed, beat)
+    except TrialRejected as rejected:
+        return Verdict(OutcomeKind.REJECTED, why=clip(str(rejected)))
     except TrialAborted as aborted:
         return _aborted(str(aborted) or "aborted without a reason", start_s)
     except (Exception, SystemExit) as fault:  # noqa: BLE001 - an evaluator outlives its tasks

@@ -38,6 +38,10 @@ class Ready(msgspec.Struct, frozen=True):
     task_digest: str
 
 
+class Resting(msgspec.Struct, frozen=True):
+    """No trials may come until there is a :class:`Ready` again."""
+
+
 class Started(msgspec.Struct, frozen=True):
     """The trial of this token runs."""
 
@@ -66,7 +70,7 @@ class Tick(msgspec.Struct, frozen=True):
     """Nothing happened for a while."""
 
 
-Event = LearnerAlive | LearnerGone | Heard | Ready | Started | Beat | Ended | Leave | Tick
+Event = LearnerAlive | LearnerGone | Heard | Ready | Resting | Started | Beat | Ended | Leave | Tick
 
 
 # -- instructions --------------------------------------------------------------------------------
@@ -102,6 +106,12 @@ class Abort(msgspec.Struct, frozen=True):
     why: str
 
 
+class Settled(msgspec.Struct, frozen=True):
+    """The learner has the result of this token, or never wants it."""
+
+    token: str
+
+
 class Quit(msgspec.Struct, frozen=True):
     """It is over."""
 
@@ -109,4 +119,4 @@ class Quit(msgspec.Struct, frozen=True):
     why: str
 
 
-Instruction = Send | Prepare | Run | Gate | Abort | Quit
+Instruction = Send | Prepare | Run | Gate | Abort | Settled | Quit

@@ -27,8 +27,10 @@ from shearline.evaluator.mail import (
     Prepare,
     Quit,
     Ready,
+    Resting,
     Run,
     Send,
+    Settled,
     Started,
 )
 from shearline.protocol.messages import (
@@ -116,11 +118,13 @@ class Mailbox:
         takes_task: It runs whatever built-in task the learner names.
         pulses: The task cannot beat (it is one call of the user's function), so leases are
             renewed for it while it runs, up to its deadline and no longer.
+        keeps: Somebody keeps results until they are acknowledged, and wants to hear when.
     """
 
     hello: Hello
     takes_task: bool = False
     pulses: bool = False
+    keeps: bool = False
     lease_s: float = 2.0
     epoch: int | None = None
     welcomed: bool = False
@@ -165,14 +169,20 @@ class Mailbox:
                 self._alive(epoch, now_s)
             case LearnerGone(epoch):
                 self._gone(epoch, now_s)
-            case Ready(engine, task_digest):
-                self._ready(engine, task_digest, now_s)
+            case Ready() | Resting():
+                self._ready(event, now_s)
             case Leave(code, why, finish):
                 self._leave(code, why, now_s, finish=finish)
             case _:
                 pass
         self._let_time_pass(now_s)
         return self._out
+
+    def owe(self, results: list[Result]) -> None:
+        """Take over results of earlier lives; they are sent until they are acknowledged."""
+        for result in results:
+            mine = replace(result, boot=self.hello.boot)
+            self.unacked[result.token] = _Unacked(mine, due_s=0.0)
 
     def wait_s(self, now_s: float) -> float:
         """Return how long nothing need be done [s], at most :data:`WAIT_S_MAX`."""
@@ -278,16 +288,20 @@ class Mailbox:
     def _acked(self, token: str) -> None:
         unacked = self.unacked.pop(token, None)
         if unacked is not None:
+            if self.keeps:
+                self._out.append(Settled(token))
             self.answered[token] = unacked.result
             while len(self.answered) > ANSWERED_MAX:
                 self.answered.popitem(last=False)
 
     # -- what the trial's thread says -----------------------------------------------------------
 
-    def _ready(self, engine: str, task_digest: str, now_s: float) -> None:
-        self.warm = True
+    def _ready(self, event: Ready | Resting, now_s: float) -> None:
+        """Have trials come, or come no more; say so at once."""
         said = self.hello
-        self.hello = replace(said, engine=engine, task_digest=task_digest)
+        self.warm = isinstance(event, Ready)
+        if isinstance(event, Ready):
+            self.hello = replace(said, engine=event.engine, task_digest=event.task_digest)
         if self.welcomed:
             if self.hello != said:
                 self._send(self._greeting())

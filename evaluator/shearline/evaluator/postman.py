@@ -13,6 +13,7 @@ import logging
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -30,6 +31,7 @@ from shearline.evaluator.mail import (
     Quit,
     Run,
     Send,
+    Settled,
     Started,
     Tick,
 )
@@ -82,6 +84,8 @@ class Exchange:
             so that a short trial need not be spoken of.
         is_open: Whether a trial may begin.
         abort_why: Why the running trial is to end at its next beat, or ``""``.
+        is_linked: Whether the learner can be reached and knows this evaluator.
+        settled: Called with the token of each result that the learner has.
         leaving: What a signal asked for.
         lease_s: Lease of an attempt, as the learner last said [s].
         complaints: Malformed messages so far.
@@ -96,6 +100,8 @@ class Exchange:
     is_busy: bool = True
     running: str = ""
     is_open: bool = True
+    is_linked: bool = False
+    settled: Callable[[str], None] = lambda _token: None
     abort_why: str = ""
     leaving: Leave | None = None
     lease_s: float = 2.0
@@ -224,6 +230,7 @@ class Postman:
                     exchange.alarm.get(timeout=wait_s)
         finally:
             exchange.employ(None)
+            exchange.is_linked = False
         assert self._end is not None
         return self._end
 
@@ -310,6 +317,7 @@ class Postman:
         """Have one event decided and carry out what follows; note the end, if it is one."""
         for instruction in self._mailbox.handle(event, time.monotonic()):
             self._carry_out(instruction)
+        self._exchange.is_linked = self._mailbox.welcomed
 
     def _up(self, message: Message) -> str:
         """Return the key for a message; it is the same for all of a kind."""
@@ -329,6 +337,8 @@ class Postman:
                 exchange.is_open = is_open
             case Abort(why):
                 exchange.abort(why)
+            case Settled(token):
+                exchange.settled(token)
             case Quit(code, why):
                 self._end = End(code, why)
                 exchange.alarm.put(None)

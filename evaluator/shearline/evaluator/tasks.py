@@ -186,7 +186,7 @@ def load_task(name: str, plant: str = DEFAULT) -> Task:
     where, colon, function = name.partition(":")
     if not colon:
         return builtin_task(name, plant)
-    module, called = _import(where)
+    module, called = import_code(where)
     found = getattr(module, function, None)
     if not callable(found):
         tasks = [f"{called}:{key}" for key, value in vars(module).items() if hasattr(value, _MARK)]
@@ -196,8 +196,12 @@ def load_task(name: str, plant: str = DEFAULT) -> Task:
     return FunctionTask(found, f"{called}:{function}")
 
 
-def _import(where: str) -> tuple[ModuleType, str]:
-    """Import a file or a module; return it and the name it goes by."""
+def import_code(where: str) -> tuple[ModuleType, str]:
+    """Import a file or a module that a person named; return it and the name it goes by.
+
+    Raises:
+        ConfigError: If there is none, or it cannot be imported.
+    """
     path = Path(where if where.endswith(".py") else f"{where}.py")
     try:
         if path.is_file():

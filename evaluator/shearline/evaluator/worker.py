@@ -18,18 +18,19 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
-from shearline.evaluator.base import Task, Trace, TrialAborted
+from shearline.evaluator.base import Attended, Task, Trace, TrialAborted
 from shearline.evaluator.builtin import builtin_task
 from shearline.evaluator.local import Verdict, run_trial
-from shearline.evaluator.mail import Beat, Ended, Prepare, Ready, Run
+from shearline.evaluator.mail import Beat, Ended, Prepare, Ready, Resting, Run
 from shearline.evaluator.mailbox import RENEW_LEASES, Mailbox
 from shearline.evaluator.plants import DEFAULT
 from shearline.evaluator.postman import End, Exchange, Postman
 from shearline.evaluator.showing import TRACE_HZ, Showing
 from shearline.evaluator.tasks import FunctionTask
 from shearline.protocol.discovery import discover
-from shearline.protocol.errors import ConfigError, LinkError
+from shearline.protocol.errors import ConfigError, LinkError, ShearlineError
 from shearline.protocol.keys import Keys, check_name
 from shearline.protocol.link import open_client
 from shearline.protocol.messages import VERSION, Hello, OutcomeKind, Result, Trial, clip
@@ -53,10 +54,19 @@ class TrialStopped(TrialAborted):
     """The worker has to leave, or the trial took too long; raised by ``beat``."""
 
 
-def default_name() -> str:
-    """Return a name that no other evaluator has: this machine's and this process's."""
-    host = re.sub(r"[^A-Za-z0-9-]+", "-", platform.node().split(".")[0]).strip("-") or "host"
-    return f"{host[:48]}-{os.getpid()}"
+def default_name(bounds: str | None = None) -> str:
+    """Return a name that no other evaluator has: this machine's and this process's.
+
+    A robot's is the same in every process, for its results may outlive one: it ends in the name of
+    its bounds file.
+    """
+    host = _plain(platform.node().split(".")[0]) or "host"
+    own = str(os.getpid()) if bounds is None else _plain(Path(bounds).stem)[:12] or "robot"
+    return f"{host[:48]}-{own}"
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9-]+", "-", text).strip("-")
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +132,8 @@ class Worker:
         self._config = config
         self._task = task
         self._takes_task = task is None
+        self._attended = _attended(task)
+        self._run = ""
         self._hard_exit = hard_exit
         self._boot = secrets.token_hex(8)
         self._engine = ""
@@ -137,6 +149,9 @@ class Worker:
 
     def run(self) -> End:
         """Run trials until the end."""
+        if self._attended is not None:
+            self._attended.join(self._be_ready, self.exchange.leave, self._look)
+            self.exchange.settled = self._attended.spool.drop
         network = threading.Thread(target=self._network, daemon=True, name="postman")
         with _signals(self.exchange), quick_switching():
             network.start()
@@ -163,6 +178,8 @@ class Worker:
             self._engine = clip(task.engine)
         except ConfigError as fault:
             self.exchange.leave(2, str(fault))
+        except ShearlineError as fault:
+            self.exchange.leave(3 if isinstance(fault, LinkError) else 4, str(fault))
         except ModuleNotFoundError as fault:
             why = f"task {task.spec.name} needs {fault.name}, which is not installed here"
             self.exchange.leave(2, f"{why}: pip install 'shearline[all]' brings all that is needed")
@@ -171,8 +188,24 @@ class Worker:
             why = f"task {task.spec.name} cannot start here: {type(fault).__name__}: {fault}"
             self.exchange.leave(4, why)
         else:
-            self._task, self._space, self._warm = task, Space(task.spec.space), True
-            self.exchange.put(Ready(self._engine, digest(task.spec)))
+            self._task, self._space = task, Space(task.spec.space)
+            if self._attended is None:
+                self._warm = True
+                self.exchange.put(Ready(self._engine, digest(task.spec)))
+
+    def _be_ready(self, ready: bool) -> None:  # noqa: FBT001 - it is what the method is about
+        """Hear from a task on hardware whether trials may come; called from any thread."""
+        assert self._task is not None
+        self._warm = ready
+        if ready:
+            self._engine = clip(self._task.engine)
+            self.exchange.put(Ready(self._engine, digest(self._task.spec)))
+        else:
+            self.exchange.put(Resting())
+
+    def _look(self) -> tuple[bool, bool]:
+        """Tell a task on hardware whether the learner can be reached, and whether it holds."""
+        return self.exchange.is_linked, not self.exchange.is_open
 
     def _take(self, spec: TaskSpec) -> None:
         """Take the learner's task, if it is a built-in that means the same here."""
@@ -201,8 +234,12 @@ class Worker:
         else:
             exchange.running = trial.token
             self._deadline_s = time.monotonic() + trial.deadline_s
+            if self._attended is not None:
+                self._attended.announce(self._run, trial)
             verdict = run_trial(self._task, trial.theta, trial.seed, self._beat, self._space)
             exchange.running = ""
+        if self._attended is not None and not self._warm:
+            exchange.tell(Resting())  # first, or the learner hands out the next one at once
         exchange.tell(Ended(self._result(trial, verdict)))
         self._log(trial, verdict)
         if self._config.traces and verdict.trace is not None:
@@ -289,26 +326,37 @@ class Worker:
         try:
             run, epoch = discover(link, wait_s, cancelled=exchange.is_leaving, besides=self._over)
             log.info("connected to %s, run %s", config.connect, run)
-            mailbox = self._mailbox()
+            self._run = run
+            mailbox = self._mailbox(run)
             end = Postman(exchange, link, Keys(run), config.name, mailbox).serve(epoch)
             self._over.add((run, mailbox.epoch or epoch))
             return end
         finally:
             link.close(CLOSE_S)
 
-    def _mailbox(self) -> Mailbox:
+    def _mailbox(self, run: str) -> Mailbox:
         own = None if self._takes_task else self._task
         function = isinstance(own, FunctionTask)
+        attended = self._attended
+        kind = "function" if function else "simulator" if attended is None else attended.kind
         hello = Hello(
             boot=self._boot,
             version=VERSION,
             task_digest="" if own is None else digest(own.spec),
-            kind=self._config.kind or ("function" if function else "simulator"),
+            kind=self._config.kind or kind,
             engine=self._engine,
-            credits=self._config.credits,
+            credits=self._config.credits if attended is None else 1,
         )
         warm = self._warm and own is not None
-        return Mailbox(hello, takes_task=own is None, pulses=function, warm=warm)
+        keeps = attended is not None
+        mailbox = Mailbox(hello, takes_task=own is None, pulses=function, keeps=keeps, warm=warm)
+        if attended is not None:
+            mailbox.owe(attended.spool.pending(run))
+        return mailbox
+
+
+def _attended(task: object) -> Attended | None:
+    return task if isinstance(task, Attended) else None
 
 
 @contextlib.contextmanager

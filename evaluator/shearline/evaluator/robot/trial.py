@@ -1,0 +1,253 @@
+"""One trial of the skill on an arm: the same layers, on the robot's own clock.
+
+The semantic and manipulation layers run unchanged at the rate of the references; what they command
+becomes references of the robot's impedance controller. This module moves the arm through a port
+and reports; it decides neither whether it may nor what becomes of the key afterwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shearline.evaluator.robot.bounds import Bounds
+from shearline.evaluator.robot.errors import Ending, MotionEnded
+from shearline.evaluator.robot.frames import apart, in_lock
+from shearline.evaluator.robot.port import Array, ContactSession, RobotPort
+from shearline.evaluator.robot.reference import Reference, contact_of, stiffness_of, target_of
+from shearline.evaluator.robot.sight import Sight, View
+from shearline.evaluator.robot.watch import Watch
+from shearline.evaluator.skill import semantic
+from shearline.evaluator.skill.manipulation import APPROACH_S, command, empty_command
+from shearline.evaluator.skill.parameters import Parameters
+from shearline.evaluator.skill.semantic import Decision, Limits
+
+#: Python may be away from a contact for so long before the trial is no measurement any more [s].
+LATE_S_MAX = 0.25
+
+#: Joint torques beyond this share of the guard when it ended a contact: it was the torque.
+GUARD_SHARE = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What one trial is to do.
+
+    Attributes:
+        p: The tuple being tried.
+        limits: What ends the trial as a failure.
+        o_t_lock: Believed pose of the lock ``(4, 4)``.
+        bounds: The lab's.
+        pace: Share of the lab's speeds, (0, 1].
+    """
+
+    p: Parameters
+    limits: Limits
+    o_t_lock: Array
+    bounds: Bounds
+    pace: float = 1.0
+
+    @property
+    def tick_s(self) -> float:
+        """Time between two references [s]."""
+        return 1.0 / self.bounds.contact.reference_hz
+
+    def start_pose(self) -> Array:
+        """Return where every trial starts: straight in front of the mouth."""
+        return in_lock(self.o_t_lock, (0.0, 0.0, -self.bounds.start.gap_m), (0.0, 0.0, 0.0))
+
+
+@dataclass(slots=True)
+class Report:
+    """What became of a trial, as far as it got.
+
+    Attributes:
+        end: Where the skill stands; its verdict is ``OPEN`` while there is none.
+        stretches: First and last time of each contact [s], robot's clock: where the log must be
+            complete.
+        notes: ``(t_s, phase, reference x, y, push, wiggle x, y, rx, ry)`` of every tick.
+        clipped: Share of the ticks that asked for more force than the clip lets through.
+        late: Ticks that were made up for because Python came late.
+    """
+
+    end: Decision = field(default_factory=semantic.beginning)
+    stretches: list[tuple[float, float]] = field(default_factory=list)
+    notes: list[tuple[float, ...]] = field(default_factory=list)
+    clipped: float = 0.0
+    late: int = 0
+
+
+def must_be_free(watch: Watch, o_t_lock: Array) -> None:
+    """Make sure that the key is not where it can only be in the lock, or deeper than its mouth.
+
+    Raises:
+        MotionEnded: With ``INVALID`` if it is: a trial from there would succeed at no cost.
+    """
+    view = Sight(o_t_lock).view(watch.look())
+    if view.tip[2] > -semantic.CLEAR_M:
+        raise MotionEnded(
+            Ending.INVALID,
+            f"the tip is {view.tip[2] * 1e3:.1f} mm deep, as if in the lock: free the key first",
+        )
+
+
+def to_start(port: RobotPort, watch: Watch, work: Work) -> None:
+    """Bring the arm to the start pose and make sure that it is there, free and tared.
+
+    Raises:
+        MotionEnded: If it does not get there; with ``INVALID`` if the robot believes that it is
+            elsewhere, or something touches the tool.
+    """
+    start, bounds = work.start_pose(), work.bounds.start
+    port.move_free(start, bounds.speed_mps * work.pace)
+    watch.refresh()
+    off_m, off_rad = apart(start, watch.look().o_t_ee)
+    if off_m > bounds.tolerance_m or off_rad > bounds.tolerance_rad:
+        raise MotionEnded(
+            Ending.INVALID,
+            f"the arm is {off_m * 1e3:.1f} mm and {np.degrees(off_rad):.1f} deg off the start pose",
+        )
+    port.set_guard(work.bounds.port_guard())
+    watch.refresh()
+    view = Sight(work.o_t_lock).view(watch.look())
+    lateral_m = float(np.hypot(view.tip[0], view.tip[1]))
+    if not semantic.may_start(float(view.tip[2]), lateral_m, view.tau_ext, work.limits):
+        raise MotionEnded(Ending.INVALID, "something touches the tool at the start pose: free it")
+
+
+class Insertion:
+    """Runs the skill from the start pose to its verdict.
+
+    Args:
+        port: Open, at the start pose, guard set.
+        watch: Looks at it.
+        work: What to do.
+        report: Filled as it goes, whatever happens.
+    """
+
+    def __init__(self, port: RobotPort, watch: Watch, work: Work, report: Report) -> None:
+        self._port = port
+        self._watch = watch
+        self._work = work
+        self._report = report
+        self._sight = Sight(work.o_t_lock)
+        self._command = empty_command()
+        self._reference = Reference(work.bounds, work.pace)
+
+    def approach(self) -> None:
+        """Go to where the skill's own approach ends, in free space.
+
+        The trajectory there is the robot's; that of the skill only says where it ends.
+        """
+        work, c = self._work, self._command
+        view = self._sight.view(self._watch.look())
+        ticks = round(APPROACH_S / work.tick_s)
+        for tick in range(ticks + 1):
+            command(c, semantic.APPROACH, tick, view.tip, 0.0, work.p, work.tick_s)
+        goal = in_lock(work.o_t_lock, c.x, c.turn.tolist())
+        self._port.move_free(goal, work.bounds.start.speed_mps * work.pace)
+        self._watch.refresh()
+        settled = round((APPROACH_S + semantic.SETTLE_S) / work.tick_s)
+        self._report.end = Decision(semantic.APPROACH, settled, 0, -1, semantic.OPEN, 0.0)
+
+    def insert(self) -> None:
+        """Seek contact and insert, to a verdict.
+
+        Raises:
+            MotionEnded: If no verdict was reached.
+            Halted: If the trial is to end; the contact has been ended.
+        """
+        view = self._sight.view(self._watch.look())
+        begin_s = view.t_s
+        self._step(view, 1)
+        while self._report.end.verdict == semantic.OPEN:
+            t_max_s = self._work.bounds.contact.trial_s - (view.t_s - begin_s)
+            if t_max_s <= 0.0:
+                raise MotionEnded(Ending.TIME, "the trial took longer than contact.trial_s")
+            view = self._stretch(view, t_max_s)
+        self._report.clipped = self._reference.clipped_share
+
+    def _stretch(self, view: View, t_max_s: float) -> View:
+        """Run one contact: as long as the stiffness that the skill asks for stays the same."""
+        c, work, report = self._command, self._work, self._report
+        stiffness, before_s = stiffness_of(c), view.t_s
+        seen: list[float] = []
+        session = self._port.contact(contact_of(c, work.o_t_lock, work.bounds, t_max_s))
+        self._watch.refresh()
+        view = self._sight.view(self._watch.look())
+        self._reference.begin(view.tip, view.turn)
+        self._step(view, self._ticks(view.t_s - before_s))
+        try:
+            while report.end.verdict == semantic.OPEN and _same(stiffness_of(c), stiffness):
+                view = self._tick(session, view)
+                seen += [view.t_s] if view.moving else []
+            session.end()
+        except MotionEnded as ended:
+            self._judge(ended, view)
+        finally:
+            report.stretches += [(seen[0], seen[-1])] if seen else []
+            _let_go(session)
+        return view
+
+    def _tick(self, session: ContactSession, view: View) -> View:
+        work = self._work
+        target = target_of(self._command, view.speed_z)
+        self._reference.toward(target, view.tip, work.tick_s)
+        session.ref(self._reference.pose(work.o_t_lock))
+        after = self._sight.view(self._watch.until(view.t_s + work.tick_s))
+        ticks = self._ticks(after.t_s - view.t_s)
+        if ticks * work.tick_s > LATE_S_MAX:
+            away_s = ticks * work.tick_s
+            raise MotionEnded(
+                Ending.TIME, f"this computer was away for {away_s:.2f} s of a contact"
+            )
+        self._report.late += ticks - 1
+        self._step(after, ticks)
+        return after
+
+    def _ticks(self, span_s: float) -> int:
+        return max(1, round(span_s / self._work.tick_s))
+
+    def _step(self, view: View, ticks: int) -> None:
+        """Run the upper layers for ``ticks``, all with what is seen now, and note the last."""
+        work, report, c = self._work, self._report, self._command
+        x, y, depth = view.tip.tolist()
+        sight = semantic.Sight(x, y, depth, -float(view.wrench[2]), APPROACH_S)
+        for _ in range(ticks):
+            now = semantic.decide(report.end, sight, view.tau_ext, work.p, work.limits, work.tick_s)
+            report.end = now
+            if now.verdict != semantic.OPEN:
+                break
+            command(c, now.phase, now.phase_ticks, view.tip, view.speed_z, work.p, work.tick_s)
+        w = c.wrench
+        report.notes.append(
+            (view.t_s, report.end.phase, c.x[0], c.x[1], w[2], w[0], w[1], w[3], w[4])
+        )
+
+    def _judge(self, ended: MotionEnded, view: View) -> None:
+        """The guard is ahead of the semantic layer: what it stopped for torque is that verdict."""
+        if ended.ending is not Ending.GUARD or self._report.end.verdict != semantic.OPEN:
+            raise ended
+        newest = self._sight.view(self._port.sample())
+        felt = np.maximum(np.abs(newest.tau_ext), np.abs(view.tau_ext))
+        guard = self._work.bounds.port_guard()
+        force = max(np.linalg.norm(v.wrench[:3]) for v in (newest, view))
+        if not ((felt > GUARD_SHARE * guard.tau_ext_max).any() or force > guard.force_max_n * 0.5):
+            raise ended
+        d = self._report.end
+        self._report.end = Decision(
+            semantic.EXTRACTION, 0, d.search_ticks, d.clock_ticks, semantic.TORQUE, view.tip[2]
+        )
+
+
+def _same(one: Array, other: Array) -> bool:
+    return bool(np.array_equal(one, other))
+
+
+def _let_go(session: ContactSession) -> None:
+    """End a contact that may be over already."""
+    try:
+        session.end()
+    except MotionEnded:
+        return

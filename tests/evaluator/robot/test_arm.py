@@ -1,0 +1,382 @@
+"""The arm's machine on the simulated stage: what moves it, and what does not."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from evaluator.robot.rig import Rig, attempt, bounds, stage, theta
+
+from shearline.evaluator.robot import pipe
+from shearline.evaluator.robot.errors import Ending, MotionEnded
+from shearline.evaluator.robot.peer import Gone
+from shearline.evaluator.robot.port import Mode
+from shearline.evaluator.robot.spool import Spool
+from shearline.evaluator.robot.states import State
+from shearline.evaluator.robot.store import Store
+from shearline.evaluator.robot.terminal import Closed, Line
+from shearline.protocol.messages import OutcomeKind
+
+Make = Callable[..., Rig]
+
+
+class Spy:
+    """Passes everything on to a stage and counts what moves it; may interfere."""
+
+    def __init__(self, interfere: Callable[[Any, str], None] = lambda _stage, _what: None) -> None:
+        self.stage = stage()
+        self.moves: list[str] = []
+        self.interfere = interfere
+
+    def __getattr__(self, name: str) -> Any:
+        if name in {"move_free", "contact", "ref"}:
+            return lambda *args: self._move(name, *args)
+        return getattr(self.stage, name)
+
+    def _move(self, name: str, *args: Any) -> Any:
+        self.moves.append(name)
+        self.interfere(self.stage, name)
+        made = getattr(self.stage, name)(*args)
+        return self if name == "contact" else made
+
+
+def lying(**lies: Any) -> Any:
+    """Return a stage whose samples can be made to lie: ``.lies`` replaces fields."""
+    port = stage()
+    true = port.sample
+    port.lies = dict(lies)
+    port.sample = lambda: true()._replace(**port.lies)
+    return port
+
+
+# -- arming --------------------------------------------------------------------------------------
+
+
+def test_nothing_moves_before_an_operator_confirms(rig: Make) -> None:
+    spy = Spy()
+    arm = rig(spy)
+    for number in range(3):
+        answer = arm.run(attempt(number))
+        assert answer.result.kind is OutcomeKind.ABORTED
+        assert "waits for its operator" in answer.result.why
+    arm.type("", "yes", "resume", "recover", "go")
+    assert spy.moves == []
+    assert arm.state is State.IDLE
+    assert not arm.takes()
+
+
+def test_a_confirmed_arm_rehearses_slowly_and_then_takes_trials(rig: Make) -> None:
+    arm = rig().armed()
+    assert "rehearsal: success" in arm.printed
+    assert arm.takes()
+    log = arm.port.drain_log()
+    assert len(log) < 100  # the rehearsal's log went with it
+
+
+def test_a_trial_succeeds_with_the_cost_and_names_of_the_simulated_one(rig: Make) -> None:
+    arm = rig().armed()
+    answer = arm.run(attempt())
+    result = answer.result
+    assert (result.kind, result.why) == (OutcomeKind.SUCCESS, "")
+    assert 0.0 < result.cost < 5.0
+    assert result.extras["depth_m"] >= 24.5e-3
+    assert result.cost == pytest.approx(result.extras["insertion_s"])
+    assert bounds().hash in result.engine
+    assert arm.state is State.READY
+    assert not arm.store.key_in_lock
+
+
+def test_a_failure_bears_the_name_it_has_in_simulation(rig: Make) -> None:
+    answer = rig().armed().run(attempt(theta=theta(app_off_x=2e-3, wig_a_x=0.0, ins_push=0.0)))
+    assert answer.result.kind is OutcomeKind.FAILURE
+    assert answer.result.why in {"roi", "time", "search", "torque"}
+    assert answer.result.cost > 5.0
+
+
+def test_the_trace_is_the_robots_log_at_one_kilohertz(rig: Make) -> None:
+    trace = rig().armed().run(attempt()).trace
+    assert trace is not None
+    columns = np.frombuffer(trace.data, "<f4").reshape(len(trace.names), trace.samples)
+    np.testing.assert_allclose(np.diff(columns[0]), 1e-3, atol=2e-4)
+    named = dict(zip(trace.names, columns, strict=True))
+    assert named["depth"].max() >= 24.5e-3
+    assert [name for _, name in trace.events][-1] in {"extraction", "success"}
+
+
+@pytest.mark.parametrize("bad", [theta(ins_push=21.0), theta(xi=float("nan")), [0.0] * 22])
+def test_what_the_bounds_do_not_allow_is_rejected_and_nothing_moves(
+    rig: Make, bad: list[float]
+) -> None:
+    spy = Spy()
+    arm = rig(spy).armed()
+    spy.moves.clear()
+    answer = arm.run(attempt(theta=bad))
+    assert answer.result.kind is OutcomeKind.REJECTED
+    assert spy.moves == []
+
+
+def test_the_same_attempt_twice_is_one_motion_and_the_same_answer(rig: Make) -> None:
+    spy = Spy()
+    arm = rig(spy).armed()
+    first = arm.run(attempt())
+    spy.moves.clear()
+    assert arm.run(attempt()) == first
+    assert spy.moves == []
+
+
+def test_step_asks_before_every_trial(rig: Make) -> None:
+    arm = rig(step=True).armed()
+    arm.inbox.put(Line("no"))
+    assert "did not grant" in arm.run(attempt(1)).result.why
+    arm.inbox.put(Line("go"))
+    assert arm.run(attempt(2)).result.kind is OutcomeKind.SUCCESS
+
+
+# -- stops and faults ----------------------------------------------------------------------------
+
+
+def user_stop(port: Any, what: str) -> None:
+    if what == "ref":
+        raise MotionEnded(Ending.USER_STOP, "the user stop was pressed")
+    port.sample()
+
+
+def test_a_user_stop_holds_the_arm_until_the_operator_recovers_and_confirms(rig: Make) -> None:
+    spy = Spy()
+    arm = rig(spy).armed()
+    spy.interfere = user_stop
+    answer = arm.run(attempt())
+    assert answer.result.kind is OutcomeKind.ABORTED
+    assert arm.state is State.HOLD
+    assert not arm.takes()
+    spy.interfere = lambda *_: None  # the button is released
+    spy.moves.clear()
+    for number in range(1, 4):
+        arm.tick()
+        arm.run(attempt(number))
+    assert spy.moves == []
+    assert arm.store.key_in_lock
+    arm.type("recover")
+    assert (arm.state, spy.moves) == (State.IDLE, [])
+    arm.armed()
+    assert "pulling out the key" in arm.printed
+    assert not arm.store.key_in_lock
+
+
+def test_exactly_one_result_is_kept_for_a_stopped_trial(rig: Make) -> None:
+    spy = Spy()
+    arm = rig(spy).armed()
+    spy.interfere = user_stop
+    asked = attempt()
+    arm.run(asked)
+    arm.run(asked)
+    (kept,) = Spool(arm.store.folder / "spool").pending("run-1")
+    assert (kept.token, kept.kind) == (asked.trial.token, OutcomeKind.ABORTED)
+
+
+def test_the_log_of_a_stopped_trial_is_written(rig: Make) -> None:
+    spy = Spy()
+    arm = rig(spy).armed()
+    spy.interfere = user_stop
+    arm.run(attempt())
+    (path,) = (arm.store.folder / "logs").glob("*.npy")
+    log = np.load(path)
+    np.testing.assert_allclose(np.diff(log[:, 0]), 1e-3, atol=1e-9)
+
+
+def test_the_operators_stop_brakes_at_once_and_holds(rig: Make) -> None:
+    arm = rig().armed()
+    arm.port.stop()
+    arm.type("stop")
+    assert arm.state is State.HOLD
+    with pytest.raises(MotionEnded):
+        arm.port.contact(None)  # type: ignore[arg-type]  # latched: nobody looks at it
+
+
+@pytest.mark.parametrize(
+    "lies",
+    [
+        {"o_f_ext": np.zeros(6)},
+        {"q": np.full(3, np.nan)},
+        {"o_t_ee": np.zeros((4, 4))},
+        {"t_s": 0.0},
+    ],
+    ids=["zero wrench", "nan", "no pose", "clock"],
+)
+def test_a_port_that_lies_is_a_fault_and_never_a_cost(rig: Make, lies: dict[str, Any]) -> None:
+    port = lying()
+    arm = rig(port).armed()
+    port.lies |= lies
+    answer = arm.run(attempt())
+    assert answer.result.kind is OutcomeKind.ABORTED
+    assert arm.state is State.FAULT
+
+
+def test_a_stop_seen_between_trials_holds_the_arm(rig: Make) -> None:
+    port = lying()
+    arm = rig(port).armed()
+    port.lies["mode"] = Mode.USER_STOPPED
+    arm.tick()
+    assert arm.state is State.HOLD
+
+
+def test_a_trial_does_not_begin_with_the_key_in_the_lock(rig: Make) -> None:
+    arm = rig(stage("hand")).armed_or_not()
+    assert arm.state is State.FAULT
+    assert "free the key first" in arm.printed
+
+
+# -- the key -------------------------------------------------------------------------------------
+
+
+def test_a_key_that_may_be_in_the_lock_is_pulled_out_first(rig: Make, store: Store) -> None:
+    store.mark_key("kill -9")
+    arm = rig(stage("hand"))
+    assert "it will first pull the key out" in arm.printed
+    arm.type("confirm")
+    assert arm.state is State.READY
+    assert arm.port.sample().o_t_ee[2, 3] > 0.1
+    assert not store.key_in_lock
+
+
+def test_the_marker_is_on_disk_before_the_key_can_be_in_the_lock(rig: Make) -> None:
+    seen: list[bool] = []
+    spy = Spy()
+    arm = rig(spy)
+    spy.interfere = lambda _stage, what: seen.append(arm.store.key_in_lock or what == "move_free")
+    arm.armed().run(attempt())
+    assert all(seen)
+
+
+def test_a_key_that_does_not_come_out_jams_the_arm_and_stays_known(
+    rig: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm = rig().armed()
+    monkeypatch.setattr(arm.port.slide, "resistance", _glued)  # type: ignore[attr-defined]
+    arm.run(attempt())
+    assert arm.state is State.JAMMED
+    assert arm.store.key_in_lock
+    assert not arm.takes()
+
+
+def _glued(at: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """Let the peg in, and not out again."""
+    return np.array([0.0, 0.0, 60.0 if at[2] > 0.005 and speed[2] < 1e-3 else 0.0])
+
+
+# -- wear and canary -----------------------------------------------------------------------------
+
+
+def test_key_and_lock_are_worn_after_their_insertions(rig: Make) -> None:
+    lab = bounds(wear=msgspec.structs.replace(bounds().wear, key_insertions=2))
+    arm = rig(lab=lab).armed()  # the rehearsal is the first
+    assert arm.run(attempt(1)).result.kind is OutcomeKind.SUCCESS
+    assert "peg-1 has done 2 insertions of 2" in arm.run(attempt(2)).result.why
+    assert arm.state is State.WORN
+    arm.type("recover", "confirm")
+    assert arm.state == State.WORN
+    arm.type("replaced key")
+    arm.armed()
+    assert arm.store.wear().insertions == {"peg-1": 1, "hole-1": 3}
+
+
+def test_a_canary_is_tried_every_so_many_trials_and_told_to_no_learner(rig: Make) -> None:
+    lab = bounds(canary=msgspec.structs.replace(bounds().canary, every=2))
+    arm = rig(lab=lab).armed()
+    for number in range(3):
+        arm.run(attempt(number))
+    answers = [said for said in arm.said if isinstance(said, pipe.Answer)]
+    assert len(answers) == 3
+    diary = (arm.store.folder / "diary.jsonl").read_text().splitlines()
+    canaries = [entry for line in diary if (entry := json.loads(line))["what"] == "canary"]
+    assert [entry["verdict"] for entry in canaries] == ["success"]
+
+
+def test_a_canary_that_fails_again_and_again_means_worn(rig: Make) -> None:
+    lab = bounds(canary=msgspec.structs.replace(bounds().canary, every=1))
+    arm = rig(lab=lab).armed()
+    arm.port.slide.resistance = lambda at, _speed: np.array([0, 0, -5e4 * max(at[2], 0.0)])  # type: ignore[attr-defined]
+    answer = arm.run(attempt())
+    assert answer.result.kind is OutcomeKind.ABORTED
+    assert arm.state is State.WORN
+    assert "the canary failed" in arm.printed
+
+
+# -- the worker ----------------------------------------------------------------------------------
+
+
+def test_a_hold_pauses_the_arm_and_a_resume_ends_that(rig: Make) -> None:
+    arm = rig().armed()
+    arm.arm.peer.held = True
+    arm.tick()
+    assert (arm.state, arm.takes()) == (State.PAUSED, False)
+    arm.arm.peer.held = False
+    arm.tick()
+    assert (arm.state, arm.takes()) == (State.READY, True)
+
+
+def test_what_the_operator_paused_no_learner_resumes(rig: Make) -> None:
+    arm = rig().armed()
+    arm.type("pause")
+    arm.tick()
+    arm.arm.peer.held = False
+    arm.tick()
+    paused = arm.state
+    arm.type("resume")
+    arm.tick()
+    assert (paused, arm.state) == (State.PAUSED, State.READY)
+
+
+def test_a_wish_to_stop_ends_the_trial_and_brings_the_key_out(rig: Make) -> None:
+    spy = Spy()
+    arm = rig(spy).armed()
+
+    def wish(_stage: Any, what: str) -> None:
+        if what == "ref":
+            arm.arm.peer.halt_why = "the run was stopped"
+
+    spy.interfere = wish
+    answer = arm.run(attempt())
+    assert (answer.result.kind, answer.result.why) == (OutcomeKind.ABORTED, "the run was stopped")
+    assert arm.state is State.READY
+    assert not arm.store.key_in_lock
+
+
+@pytest.mark.parametrize(
+    ("policy", "kind"), [("finish", OutcomeKind.SUCCESS), ("stop", OutcomeKind.ABORTED)]
+)
+def test_a_trial_whose_learner_is_out_of_reach_is_finished_or_stopped_as_the_lab_says(
+    rig: Make, policy: str, kind: OutcomeKind
+) -> None:
+    spy = Spy()
+    arm = rig(spy, lab=bounds(link_loss=policy)).armed()
+
+    def cut(_stage: Any, _what: str) -> None:
+        arm.arm.peer.linked = False
+
+    spy.interfere = cut
+    answer = arm.run(attempt())
+    assert answer.result.kind is kind
+    assert arm.state is State.READY
+    assert not arm.store.key_in_lock
+    assert Spool(arm.store.folder / "spool").pending("run-1") == [answer.result]
+
+
+@pytest.mark.parametrize("item", [Gone(), Closed(), pipe.Leave(why="the worker leaves")])
+def test_the_arm_ends_when_the_worker_or_the_terminal_is_gone(rig: Make, item: object) -> None:
+    arm = rig().armed()
+    over = arm.arm.handle(item)
+    assert over is not None
+    assert over.code == 0
+    assert arm.state is State.OFFLINE
+
+
+def test_no_message_of_the_pipe_arms_recovers_or_widens_anything() -> None:
+    names = {kind.__name__ for kind in pipe.ToArm.__args__}
+    assert names == {"Try", "Stop", "Look", "Leave"}
+    fields = {f for kind in pipe.ToArm.__args__ for f in kind.__struct_fields__}
+    assert fields == {"run", "trial", "why", "linked", "held"}

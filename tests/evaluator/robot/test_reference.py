@@ -1,0 +1,73 @@
+"""Commands of the skill as references of the robot's controller."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from evaluator.robot.rig import O_T_LOCK, bounds
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shearline.evaluator.robot.frames import in_lock, is_pose
+from shearline.evaluator.robot.reference import Reference, contact_of, stiffness_of, target_of
+from shearline.evaluator.robot.sight import turn_of
+from shearline.evaluator.skill.manipulation import AXIAL_K, Command, empty_command
+
+DT_S = 0.005
+
+
+def command(**changes: list[float]) -> Command:
+    """Return a command that holds all but the axis, as in an insertion."""
+    c = empty_command()
+    c.stiffness[:] = [500.0, 500.0, 0.0, 50.0, 50.0, 50.0]
+    c.ratio[0] = 0.7
+    for name, values in changes.items():
+        getattr(c, name)[:] = values
+    return c
+
+
+def test_a_push_becomes_the_displacement_that_pushes_as_hard_at_rest() -> None:
+    c = command(x=[1e-3, 0.0, 0.02], wrench=[5.0, 0.0, 15.0, 0.5, 0.0, 0.0])
+    target = target_of(c, speed_z=0.0)
+    pull = stiffness_of(c) * (target - [*c.x, *c.turn])
+    np.testing.assert_allclose(pull, c.wrench)
+    assert stiffness_of(c)[2] == AXIAL_K
+
+
+def test_above_its_speed_the_skill_pushes_less() -> None:
+    c = command(wrench=[0.0, 0.0, 15.0, 0.0, 0.0, 0.0], v=[0.0, 0.0, 0.02], drag=[0.0, 0.0, 300.0])
+    assert target_of(c, 0.05)[2] < target_of(command(wrench=list(c.wrench)), 0.05)[2]
+
+
+def test_a_contact_has_the_labs_clip_and_the_locks_axes() -> None:
+    contact = contact_of(command(), O_T_LOCK, bounds(), 3.0)
+    assert (contact.clip_m, contact.t_max_s, contact.damping_ratio) == (0.02, 3.0, 0.7)
+    np.testing.assert_array_equal(contact.o_r_c, O_T_LOCK[:3, :3])
+
+
+@given(st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6), st.floats(0.05, 1.0))
+def test_a_reference_never_moves_faster_than_it_may(goal: list[float], pace: float) -> None:
+    reference, limits = Reference(bounds(), pace), bounds().contact
+    reference.begin(np.zeros(3), np.zeros(3))
+    before = reference.pose(np.eye(4))
+    for _ in range(5):
+        reference.toward(np.array(goal), np.zeros(3), DT_S)
+        after = reference.pose(np.eye(4))
+        step = np.linalg.norm(after[:3, 3] - before[:3, 3])
+        assert step <= pace * limits.reference_mps * DT_S * (1.0 + 1e-9)
+        assert is_pose(after)
+        before = after
+
+
+def test_what_the_clip_takes_away_is_counted() -> None:
+    reference = Reference(bounds(), 1.0)
+    reference.begin(np.zeros(3), np.zeros(3))
+    reference.toward(np.array([0.019, 0, 0, 0, 0, 0]), np.zeros(3), DT_S)
+    reference.toward(np.array([0.021, 0, 0, 0, 0, 0]), np.zeros(3), DT_S)
+    assert reference.clipped_share == pytest.approx(0.5)
+
+
+@given(st.tuples(*[st.floats(-0.7, 0.7)] * 3))
+def test_a_turn_is_read_back_as_it_was_commanded(turn: tuple[float, ...]) -> None:
+    placed = in_lock(np.eye(4), (0.0, 0.0, 0.0), turn)
+    np.testing.assert_allclose(turn_of(placed[:3, :3]), turn, atol=1e-9)
