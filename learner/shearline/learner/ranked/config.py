@@ -36,7 +36,7 @@ class RankedConfig:
     scout_spread: float = 0.2
     pessimism: float = 0.5
     spread: float = 1.0
-    widening: float = 0.15
+    widening: float = 0.3
     floor: float = 0.15
     moves: int = 2
     draws: int = 30
