@@ -59,6 +59,16 @@ def test_one_kind_of_outcome_is_no_certainty(seed: int, success: bool) -> None: 
     assert np.all((p > 0.0) & (p < 1.0))
 
 
+def test_what_was_seen_while_a_run_was_wide_still_counts_when_it_is_narrow() -> None:
+    rng = np.random.default_rng(3)
+    wide, narrow = rng.random((60, 4)), 0.6 + 0.01 * rng.standard_normal((200, 4))
+    success = np.append(wide[:, 0] > 0.5, np.full(200, fill_value=True))
+    u = np.vstack([wide, narrow])
+    model = fitted(Trials(np.arange(260), u, np.ones(260), success))
+    less, more = model.probability(np.array([[0.5, 0.6, 0.6, 0.6], [0.7, 0.6, 0.6, 0.6]]))
+    assert less < more
+
+
 @given(SEEDS)
 def test_the_order_of_parameters_means_nothing(seed: int) -> None:
     trials, order = tried(seed, 40), np.array([2, 0, 3, 1])

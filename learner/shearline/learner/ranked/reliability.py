@@ -119,9 +119,7 @@ def fit_reliability(seen: Trials, won: Trials) -> Reliability:
     return Reliability(centre, scale, mean, covariance)
 
 
-def _laplace(
-    phi: Array, success: npt.NDArray[np.bool_], precision: Array
-) -> tuple[Array, Array]:
+def _laplace(phi: Array, success: npt.NDArray[np.bool_], precision: Array) -> tuple[Array, Array]:
     """Return mode ``(f,)`` and inverse curvature ``(f, f)`` of the log posterior."""
     mean = np.zeros(phi.shape[1])
     for _ in range(NEWTON_STEPS):
