@@ -25,13 +25,6 @@ def test_a_heap_of_costs_is_found_to_be_noise() -> None:
     assert model.noise > 0.5
 
 
-def test_a_slope_is_seen_through_noise() -> None:
-    rng = np.random.default_rng(5)
-    u, fresh = rng.random((80, 20)), rng.random((200, 20))
-    cost = np.exp(u[:, 0] + 0.5 * rng.standard_normal(80))
-    assert np.corrcoef(fit_cost(u, cost).mean(fresh), fresh[:, 0])[0, 1] > 0.4
-
-
 @settings(max_examples=10)
 @given(SEEDS)
 def test_doubt_grows_away_from_the_data_and_shows_in_a_pessimistic_cost(seed: int) -> None:
