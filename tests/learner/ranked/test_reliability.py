@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from shearline.learner.base import Array
 from shearline.learner.ledger import Trials
-from shearline.learner.ranked.reliability import Reliability, fit_reliability
+from shearline.learner.ranked.reliability import Reliability, fit_reliability, sigmoid
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -72,6 +74,16 @@ def test_what_was_seen_while_a_run_was_wide_still_counts_when_it_is_narrow(seed:
     fresh = centre + 0.1 * rng.standard_normal((200, 12))
     p = fitted(Trials(np.arange(200), u, np.ones(200), success)).probability(fresh)
     assert np.corrcoef(p, log_odds(fresh))[0, 1] > 0.4
+
+
+@given(SEEDS)
+def test_a_snapshot_is_the_same_function_written_around_the_middle(seed: int) -> None:
+    model, u = fitted(tried(seed, 50)), np.random.default_rng(seed).random((20, 4))
+    said: dict[str, Any] = dict(model.snapshot())
+    z = (u - np.array(said["centre"])) / np.array(said["scale"])
+    square = z**2 - 1.0
+    phi = np.hstack([np.ones((20, 1)), square.mean(axis=1, keepdims=True), z, square])
+    np.testing.assert_allclose(sigmoid(phi @ said["weights"]), model.probability(u), rtol=1e-9)
 
 
 @given(SEEDS)

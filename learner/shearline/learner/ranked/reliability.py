@@ -64,16 +64,27 @@ class Reliability:
         return self._deviation(features(u, self.centre, self.scale))
 
     def snapshot(self) -> Mapping[str, object]:
-        """Return the log-odds as plain values; ``weights`` belong to :func:`features`.
+        """Return the log-odds as plain values, as one sum over ``z = (u - centre) / scale``.
 
-        It parts the space where success and failure are equally likely.
+        ``w_0 + w_1 mean(z^2 - 1) + sum_j (a_j z_j + b_j (z_j^2 - 1))`` with the weights ``w_0, w_1,
+        a, b``: the form that reports draw. It parts the space where success and failure are equally
+        likely.
         """
         return {
             "kind": "log-odds",
             "centre": self.centre.tolist(),
             "scale": self.scale.tolist(),
-            "weights": self.mean.tolist(),
+            "weights": self._around_centre().tolist(),
         }
+
+    def _around_centre(self) -> Array:
+        """Return the weights ``(2 + 2 n,)`` of z, with ``x = x_c + 2 scale z``."""
+        n = len(self.centre)
+        at, step = 2.0 * self.centre - 1.0, 2.0 * self.scale
+        line, curve = self.mean[2 : 2 + n], self.mean[2 + n :]
+        constant = self.mean[0] + line @ at + curve @ (at**2 + step**2 - 1.0 / 3.0)
+        slopes = step * (line + 2.0 * curve * at)
+        return np.hstack([constant, self.mean[1], slopes, curve * step**2])
 
     def _deviation(self, phi: Array) -> Array:
         variance: Array = np.sum((phi @ self.covariance) * phi, axis=1)
