@@ -138,6 +138,17 @@ def test_the_cost_of_the_middle_is_told_from_the_costs_around_it() -> None:
     assert hill.cost.min() <= recommendation(SPACE, hill, MIDDLE).cost <= hill.cost.max()
 
 
+def test_noise_alone_promises_no_lower_cost_in_the_middle() -> None:
+    n, promised = 20, []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        u, cost = 0.5 + 0.1 * rng.standard_normal((60, n)), np.exp(0.5 * rng.standard_normal(60))
+        trials = Trials(np.arange(60), u, cost, np.ones(60, dtype=np.bool_))
+        focus = Focus(np.full(n, 0.5), np.full(n, 0.1))
+        promised.append(recommendation(Space.unit(n), trials, focus).cost)
+    assert np.mean(promised) == pytest.approx(math.exp(0.125), rel=0.1)
+
+
 def test_a_single_success_makes_no_region() -> None:
     assert recommendation(SPACE, trials_around(10, 1), MIDDLE).region is None
 

@@ -24,6 +24,8 @@ from shearline.protocol.space import Space
 ON_POLICY_TRIALS = 60
 #: Share of the recent successes, nearest first, that the expected cost rests on.
 NEAR_SHARE = 0.75
+#: Standard errors that a slope of the cost must exceed to be believed.
+SURE = 2.0
 #: Sizes of regions that are weighed, in multiples of how far out a recent trial typically lies.
 REACHES = (0.5, 1.0, 2.0)
 #: Trials farther out than so many reaches say nothing about a region.
@@ -96,8 +98,10 @@ def _expected_cost(recent: Trials, focus: Focus) -> float:
     """Return what a success in the middle is expected to cost; ``nan`` without any success.
 
     The costs of the recent successes are fitted by ``a + b d^2``, with ``d`` the distance from
-    the middle and ``b`` no less than 0, over the nearer ``NEAR_SHARE`` of them; ``a`` is what is
-    expected, but no less than the cheapest of them.
+    the middle, over the nearer ``NEAR_SHARE`` of them; ``a`` is what is expected, but no less than
+    the cheapest of them. Of ``b`` only that is believed which noise would not show as well: what
+    exceeds two of its standard errors. In many dimensions all trials lie about equally far out, and
+    a slope made of noise would promise for the middle what none of them had.
     """
     won = recent.where(recent.success)
     if not len(won):
@@ -107,8 +111,16 @@ def _expected_cost(recent: Trials, focus: Focus) -> float:
     x, cost = square[near], won.cost[near]
     offset = x - x.mean()
     variance = float(offset @ offset)
-    slope = max(0.0, float(offset @ cost) / variance) if variance > 0.0 else 0.0
+    slope = _sure_slope(offset, cost - cost.mean()) if len(x) > 2 and variance > 0.0 else 0.0
     return max(float(cost.mean()) - slope * float(x.mean()), float(cost.min()))
+
+
+def _sure_slope(x: Array, y: Array) -> float:
+    """Return by how much the slope of ``y`` over ``x (k,)``, both of mean 0, is surely above 0."""
+    variance = float(x @ x)
+    slope = float(x @ y) / variance
+    error = math.sqrt(float(np.sum(np.square(y - slope * x))) / (len(x) - 2) / variance)
+    return max(0.0, slope - SURE * error)
 
 
 def claimed_region(space: Space, recent: Trials, focus: Focus) -> Region | None:

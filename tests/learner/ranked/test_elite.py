@@ -40,6 +40,30 @@ def test_draws_stay_in_the_cube_however_few_the_samples(
     assert np.all((draws >= 0.0) & (draws <= 1.0))
 
 
+@given(SEEDS, st.integers(1, 30), st.integers(1, 8), st.floats(0.0, 0.5))
+def test_an_elite_grows_to_a_least_spread_in_all_directions_alike_and_never_shrinks(
+    seed: int, count: int, n: int, least: float
+) -> None:
+    before = fit_elite(np.random.default_rng(seed).random((count, n)), 1.0)
+    after = before.at_least(least)
+    grown = after.deviation / before.deviation
+    np.testing.assert_allclose(grown, grown[0])
+    assert grown[0] >= 1.0
+    assert np.exp(np.mean(np.log(after.deviation))) >= least * (1.0 - 1e-9)
+
+
+@given(SEEDS, st.integers(1, 30), st.integers(1, 8))
+def test_an_elite_that_moves_keeps_its_spread_and_ends_among_what_it_moved_to(
+    seed: int, count: int, n: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    before, best = fit_elite(rng.random((9, n)), 1.0), rng.random((count, n))
+    after = before.moved(best)
+    np.testing.assert_array_equal(after.factor, before.factor)
+    assert np.all(after.centre >= best.min(axis=0) - 1e-12)
+    assert np.all(after.centre <= best.max(axis=0) + 1e-12)
+
+
 @given(SEEDS, st.floats(0.0, 1e6), st.floats(1e-3, 1e3))
 def test_less_reliable_or_dearer_is_worse_in_any_unit(seed: int, zero: float, unit: float) -> None:
     rng = np.random.default_rng(seed)

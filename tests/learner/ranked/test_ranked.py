@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shearline.learner import Learner, Space, SwitchError, create
+from shearline.learner import Learner, Proposal, Space, SwitchError, create
+from shearline.learner.base import Array
 from shearline.learner.testing import play
 from shearline.sims.functions import shifted, sphere
 from shearline.sims.ridges import by_name
@@ -44,6 +45,32 @@ def test_success_near_a_cheap_fragile_ridge_becomes_the_rule() -> None:
 def test_a_bowl_is_followed_far_down() -> None:
     run = run_learner("psp-ranked", shifted(sphere, 10, 3), episodes=5, episode_length=20, seed=3)
     assert run.best < 0.03 * run.cost[:20].min()
+
+
+def noisy_slope(**switches: float) -> tuple[Array, Array]:
+    """Return where it ends on a slope of costs that are mostly noise, and how far it spreads."""
+    learner, rng = (
+        create("psp-ranked", Space.unit(6), 20, seed=1, **switches),
+        np.random.default_rng(1),
+    )
+
+    def outcome(p: Proposal) -> tuple[float, bool]:
+        return float(np.exp(0.6 * rng.standard_normal() - p.theta[:2].sum())), True
+
+    play(learner, 6, outcome)
+    last = np.array([p.theta for p in learner.ask(20)])
+    return learner.recommend().theta, last.std(axis=0)
+
+
+def test_costs_that_are_mostly_noise_do_not_end_the_search() -> None:
+    kept, lost = noisy_slope()[1], noisy_slope(floor=0.0)[1]
+    assert kept.mean() > 1.5 * lost.mean()
+
+
+def test_a_slope_under_noise_is_followed_beyond_the_best_that_was_tried() -> None:
+    middle = noisy_slope()[0]
+    assert middle[:2].min() > 0.85
+    assert middle[:2].sum() > noisy_slope(moves=0)[0][:2].sum()
 
 
 def refreshed(every: int) -> Learner:
@@ -83,7 +110,16 @@ def test_few_successes_are_scouted_around() -> None:
 
 
 @pytest.mark.parametrize(
-    "switches", [{"draws": 0}, {"draws": 2.5}, {"cost": 1}, {"refresh": -1}, {"sharp": 1}]
+    "switches",
+    [
+        {"draws": 0},
+        {"draws": 2.5},
+        {"cost": 1},
+        {"refresh": -1},
+        {"floor": 2.0},
+        {"moves": -1},
+        {"sharp": 1},
+    ],
 )
 def test_a_senseless_switch_is_refused(switches: dict[str, Any]) -> None:
     with pytest.raises(SwitchError, match=next(iter(switches))):

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from shearline.learner.base import Array
 from shearline.learner.ledger import Trials
-from shearline.learner.ranked.reliability import Reliability, fit_reliability
+from shearline.learner.ranked.reliability import Reliability, fit_reliability, sigmoid
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -57,6 +60,30 @@ def test_one_kind_of_outcome_is_no_certainty(seed: int, success: bool) -> None: 
     same = Trials(trials.number, trials.u, trials.cost, np.full(30, success))
     p = fit_reliability(same, trials).probability(trials.u)
     assert np.all((p > 0.0) & (p < 1.0))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_was_seen_while_a_run_was_wide_still_counts_when_it_is_narrow(seed: int) -> None:
+    def log_odds(u: Array) -> Array:
+        return 1.0 + 8.0 * (u[:, 0] - 0.5) - 6.0 * (u[:, 1] - 0.5)
+
+    rng, centre = np.random.default_rng(seed), np.array([0.75, 0.3, *[0.5] * 10])
+    u = np.vstack([rng.random((60, 12)), centre + 0.05 * rng.standard_normal((140, 12))])
+    u = np.clip(u, 0.0, 1.0)
+    success = rng.random(200) < 1.0 / (1.0 + np.exp(-log_odds(u)))
+    fresh = centre + 0.1 * rng.standard_normal((200, 12))
+    p = fitted(Trials(np.arange(200), u, np.ones(200), success)).probability(fresh)
+    assert np.corrcoef(p, log_odds(fresh))[0, 1] > 0.4
+
+
+@given(SEEDS)
+def test_a_snapshot_is_the_same_function_written_around_the_middle(seed: int) -> None:
+    model, u = fitted(tried(seed, 50)), np.random.default_rng(seed).random((20, 4))
+    said: dict[str, Any] = dict(model.snapshot())
+    z = (u - np.array(said["centre"])) / np.array(said["scale"])
+    square = z**2 - 1.0
+    phi = np.hstack([np.ones((20, 1)), square.mean(axis=1, keepdims=True), z, square])
+    np.testing.assert_allclose(sigmoid(phi @ said["weights"]), model.probability(u), rtol=1e-9)
 
 
 @given(SEEDS)

@@ -20,6 +20,9 @@ class RankedConfig:
         pessimism: Posterior deviations by which the log-odds of success are taken too low.
         spread: Factor on the deviations of the elite when drawing.
         widening: Most by which that factor grows while the elite is not reliable.
+        floor: Mean deviation below which the draws do not narrow where all of the cost is noise, in
+            edges of the cube; where the model explains it, in proportion less.
+        moves: How often an update moves the middle to the best of the model's own draws.
         draws: Proposals that are ranked for each trial; 1 ranks nothing.
         reliability: Whether the ranking knows the chance of success; for comparison.
         cost: Whether the elite is chosen by the model of cost, or by each success's own cost; for
@@ -33,7 +36,9 @@ class RankedConfig:
     scout_spread: float = 0.2
     pessimism: float = 0.5
     spread: float = 1.0
-    widening: float = 0.15
+    widening: float = 0.3
+    floor: float = 0.15
+    moves: int = 2
     draws: int = 30
     reliability: bool = True
     cost: bool = True
@@ -47,6 +52,8 @@ class RankedConfig:
         _check(self.pessimism >= 0, "pessimism", "0 or more", self.pessimism)
         _check(self.spread > 0, "spread", "above 0", self.spread)
         _check(self.widening >= 0, "widening", "0 or more", self.widening)
+        _check(0 <= self.floor <= 1, "floor", "0 to 1", self.floor)
+        _check(0 <= self.moves <= 100, "moves", "0 to 100", self.moves)
         _check(1 <= self.draws <= 10_000, "draws", "1 to 10000", self.draws)
         _check(self.window >= 10, "window", "10 or more", self.window)
         _check(self.cost_window >= 10, "cost_window", "10 or more", self.cost_window)

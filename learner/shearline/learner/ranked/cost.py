@@ -23,6 +23,11 @@ CURVE_LENGTHS = (0.06, 0.2)
 LOG_VARIANCE = (-16.0, 5.0)
 LOG_LENGTH = (-1.0, 3.0)
 SEARCH_ROUNDS = 25
+#: Before anything is seen: centres and deviations of the log parts and of the log length. Half of
+#: the variance is noise, a tenth for each parameter a quadratic: a few dozen costs that are mostly
+#: noise do not say by themselves how much of them is, and the likeliest answer is too often all.
+PRIOR_CENTRE = np.array([-2.3, -4.0, -2.0, -0.7, 1.0])
+PRIOR_SPREAD = np.array([2.0, 8.0, 2.0, 2.0, 2.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,10 +192,8 @@ def _loss(log: Array, parts: Parts, target: Array) -> tuple[float, Array]:
         ]
     )
     loss = 0.5 * float(target @ weights) + float(np.sum(np.log(np.diag(factor))))
-    # A weak pull towards small parts (a normal with deviation 8 around its centre).
-    centre = np.array([-4.0, -4.0, -4.0, -4.0, 1.0])
-    pull = (log - centre) / 64.0
-    return loss + 0.5 * float(pull @ (log - centre)), gradient + pull
+    away = (log - PRIOR_CENTRE) / PRIOR_SPREAD
+    return loss + 0.5 * float(away @ away), gradient + away / PRIOR_SPREAD
 
 
 def _inverted(covariance: Array) -> tuple[Array, Array]:

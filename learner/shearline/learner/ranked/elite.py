@@ -6,7 +6,7 @@ It knows scores, not where they come from.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,6 +35,23 @@ class Elite:
         """Standard deviations along the axes ``(n,)``."""
         lengths: Array = np.sqrt(np.sum(self.factor**2, axis=1))
         return lengths
+
+    def at_least(self, deviation: float) -> Elite:
+        """Return it, grown in all directions alike until its mean deviation is no less.
+
+        Args:
+            deviation: Geometric mean over the axes, in edges of the cube; 0 or more.
+        """
+        mean = float(np.exp(np.mean(np.log(self.deviation))))
+        return replace(self, factor=self.factor * max(1.0, deviation / mean))
+
+    def moved(self, best: Array) -> Elite:
+        """Return it around the log-rank weighted mean of tuples ``(count, n)``, best first.
+
+        One step of the cross-entropy method for the middle alone (Rubinstein 1999): the spread
+        stays, since it is there to learn from and not to end soon.
+        """
+        return replace(self, centre=rank_weights(len(best)) @ best)
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """Return ``(count, n)`` draws, folded back into the cube."""

@@ -6,7 +6,7 @@ A model is a value: making one draws nothing and changes nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,9 @@ from shearline.learner.threads import fitting
 
 #: Least length that counts as one step when trials are looked for, in edges of the cube.
 STEP_MIN = 1e-3
+#: Draws by which the middle is moved, and how many of them it moves to.
+MOVE_DRAWS = 300
+MOVE_BEST = 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,15 @@ class Model:
     def first(self, u: Array) -> Array:
         """Return the tuple ``(n,)`` of ``(m, n)`` that ranks first; ties go to the earlier."""
         return np.array(u[int(np.argmin(self.score(u)))])
+
+    def moved(self) -> Model:
+        """Return the model with its elite moved to the best tenth of its own draws.
+
+        The draws are the same every time, so that the move is a function of the model alone.
+        """
+        draws = self.elite.draw(np.random.default_rng(0), MOVE_DRAWS)
+        best = np.argsort(self.score(draws), kind="stable")[:MOVE_BEST]
+        return replace(self, elite=self.elite.moved(draws[best]))
 
     def snapshot(self) -> Mapping[str, object]:
         """Return elite, samples and the reliability, which parts the space, as plain values."""
@@ -110,17 +122,21 @@ def _fit(seen: Trials, won: Trials, episode_length: int, config: RankedConfig) -
     worth = score(expected, chance if config.reliability else np.ones(len(won)), price)
     size = elite_size(episode_length, won.u.shape[1], len(won), cost.noise)
     order = np.argsort(worth, kind="stable")[:size]
-    return Model(
+    elite = fit_elite(won.u[order], widened(config, reliability.probability(won.u[order])))
+    model = Model(
         trials=seen,
         good=np.isin(seen.number, won.number[order]),
         reliability=reliability,
         cost=cost,
         price=price,
-        elite=fit_elite(won.u[order], widened(config, reliability.probability(won.u[order]))),
+        elite=elite.at_least(config.floor * cost.noise),
         threshold=float(worth[order[-1]]),
         pessimism=config.pessimism,
         heeded=config.reliability,
     )
+    for _ in range(config.moves):
+        model = model.moved()
+    return model
 
 
 def widened(config: RankedConfig, chance: Array) -> float:

@@ -1,14 +1,12 @@
-"""How likely a tuple succeeds: Bayesian logistic regression around the middle of the successes.
+"""How likely a tuple succeeds: Bayesian logistic regression on the cube.
 
-With a handful of trials for each parameter, what is best known about success is how far out it
-reaches: the distance from the middle of the successes, in their own deviations, gets a weight of
-its own with a wide prior. Each parameter and its square may depart from that, under a prior that
-keeps the many small departures small and lets a few be large. It knows tuples and outcomes, no
-costs.
+The log-odds of success are a quadratic in each parameter, measured in half edges of the cube, and
+a multiple of how far out the tuple lies from the middle of the successes, in their own deviations.
+The curves keep their unit however far a run has narrowed, so that what was seen when it was wide
+still counts; the distance is what is known best with a handful of trials for each parameter. It
+knows tuples and outcomes, no costs.
 
-The posterior is Laplace's approximation (Bishop 2006, section 4.5). The departures have Student's
-distribution, each with a precision of its own that is found by expectation maximisation
-(Tipping 2001, JMLR 1:211-244).
+The posterior is Laplace's approximation (Bishop 2006, section 4.5).
 """
 
 from __future__ import annotations
@@ -22,17 +20,15 @@ import numpy.typing as npt
 from shearline.learner.base import Array
 from shearline.learner.ledger import Trials
 
-#: Steps of Newton, and rounds in which the prior is renewed after them.
+#: Steps of Newton, at most.
 NEWTON_STEPS = 12
-PRIOR_ROUNDS = 4
 #: Precision of the prior on the intercept and on the distance: log-odds of some units either way.
 WIDE = 0.05
-#: Precision of a departure before anything is known: little next to the distance.
-NARROW = 300.0
-#: Shape of the prior on that precision; the smaller, the more departures may be large.
-SHAPE = 1.0
-#: Least length that counts as one deviation of the successes, in edges of the cube.
-SCALE_MIN = 1e-3
+#: Precision of the weights of one parameter: log-odds of about one unit for half an edge.
+EACH = 1.0
+#: Least length that counts as one deviation of the successes, in edges of the cube: a run that has
+#: narrowed to nothing does not take all that it saw before for far away.
+SCALE_MIN = 0.05
 #: Log-odds beyond this change no decision and only lose digits.
 LOGIT_MAX = 30.0
 
@@ -68,16 +64,27 @@ class Reliability:
         return self._deviation(features(u, self.centre, self.scale))
 
     def snapshot(self) -> Mapping[str, object]:
-        """Return the log-odds as plain values; ``weights`` belong to :func:`features`.
+        """Return the log-odds as plain values, as one sum over ``z = (u - centre) / scale``.
 
-        It parts the space where success and failure are equally likely.
+        ``w_0 + w_1 mean(z^2 - 1) + sum_j (a_j z_j + b_j (z_j^2 - 1))`` with the weights ``w_0, w_1,
+        a, b``: the form that reports draw. It parts the space where success and failure are equally
+        likely.
         """
         return {
             "kind": "log-odds",
             "centre": self.centre.tolist(),
             "scale": self.scale.tolist(),
-            "weights": self.mean.tolist(),
+            "weights": self._around_centre().tolist(),
         }
+
+    def _around_centre(self) -> Array:
+        """Return the weights ``(2 + 2 n,)`` of z, with ``x = x_c + 2 scale z``."""
+        n = len(self.centre)
+        at, step = 2.0 * self.centre - 1.0, 2.0 * self.scale
+        line, curve = self.mean[2 : 2 + n], self.mean[2 + n :]
+        constant = self.mean[0] + line @ at + curve @ (at**2 + step**2 - 1.0 / 3.0)
+        slopes = step * (line + 2.0 * curve * at)
+        return np.hstack([constant, self.mean[1], slopes, curve * step**2])
 
     def _deviation(self, phi: Array) -> Array:
         variance: Array = np.sum((phi @ self.covariance) * phi, axis=1)
@@ -85,7 +92,9 @@ class Reliability:
 
 
 def features(u: Array, centre: Array, scale: Array) -> Array:
-    """Return ``[1, mean(z^2 - 1), z, z^2 - 1]`` with ``z = (u - centre) / scale``.
+    """Return ``[1, mean(z^2 - 1), x, x^2 - 1/3]``.
+
+    ``z = (u - centre) / scale`` and ``x = 2 u - 1``, whose square has the mean 1/3 over the cube.
 
     Args:
         u: Tuples ``(m, n)``.
@@ -95,9 +104,9 @@ def features(u: Array, centre: Array, scale: Array) -> Array:
     Returns:
         ``(m, 2 + 2 n)``.
     """
-    z = (u - centre) / scale
-    square = np.square(z) - 1.0
-    return np.hstack([np.ones((len(u), 1)), square.mean(axis=1, keepdims=True), z, square])
+    x = 2.0 * u - 1.0
+    out = np.mean(np.square((u - centre) / scale) - 1.0, axis=1, keepdims=True)
+    return np.hstack([np.ones((len(u), 1)), out, x, np.square(x) - 1.0 / 3.0])
 
 
 def sigmoid(logit: Array) -> Array:
@@ -115,20 +124,15 @@ def fit_reliability(seen: Trials, won: Trials) -> Reliability:
     """
     centre, scale = won.u.mean(axis=0), np.maximum(won.u.std(axis=0), SCALE_MIN)
     phi, success = features(seen.u, centre, scale), seen.success
-    precision = np.full(phi.shape[1], NARROW)
+    precision = np.full(phi.shape[1], EACH)
     precision[:2] = WIDE
-    mean = np.zeros(phi.shape[1])
-    for _ in range(PRIOR_ROUNDS):
-        mean, covariance = _laplace(phi, success, mean, precision)
-        size = np.square(mean) + np.diag(covariance)
-        precision[2:] = ((2.0 * SHAPE + 1.0) / (size + 2.0 * SHAPE / NARROW))[2:]
+    mean, covariance = _laplace(phi, success, precision)
     return Reliability(centre, scale, mean, covariance)
 
 
-def _laplace(
-    phi: Array, success: npt.NDArray[np.bool_], mean: Array, precision: Array
-) -> tuple[Array, Array]:
+def _laplace(phi: Array, success: npt.NDArray[np.bool_], precision: Array) -> tuple[Array, Array]:
     """Return mode ``(f,)`` and inverse curvature ``(f, f)`` of the log posterior."""
+    mean = np.zeros(phi.shape[1])
     for _ in range(NEWTON_STEPS):
         p = sigmoid(phi @ mean)
         step = np.linalg.solve(
