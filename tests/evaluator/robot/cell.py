@@ -17,6 +17,7 @@ from emulator.process import Emulator
 from evaluator.robot.rig import EXAMPLES, O_T_LOCK, attempt
 
 from shearline.evaluator.base import Outcome, TrialAborted, TrialRejected
+from shearline.evaluator.robot.bounds import Bounds, read_bounds
 from shearline.evaluator.robot.process import Orders
 from shearline.evaluator.robot.store import Calibration
 from shearline.evaluator.robot.task import RobotTask
@@ -55,10 +56,16 @@ def believed() -> np.ndarray:
     return made
 
 
-def calibrate(folder: Path, o_t_lock: np.ndarray) -> None:
+def calibrate(folder: Path, o_t_lock: np.ndarray, lab: Bounds) -> None:
     """Write what the operator's hand would have shown."""
     shown = Calibration(
-        o_t_lock=tuple(o_t_lock.ravel().tolist()), spread_m=0.0, spread_rad=0.0, repeats=5, at=""
+        o_t_lock=tuple(o_t_lock.ravel().tolist()),
+        spread_m=0.0,
+        spread_rad=0.0,
+        repeats=5,
+        at="",
+        tool=lab.tool,
+        seated_m=lab.lock.seated_m,
     )
     folder.mkdir(exist_ok=True)
     (folder / "calibration.json").write_bytes(msgspec.json.encode(shown))
@@ -86,7 +93,8 @@ class Cell:
         stage = (EXAMPLES / "stage.toml").read_text()
         path = self.folder / "lab.toml"
         path.write_text(self.lab + (stage if self.kind is None else FRANKA_LAB))
-        calibrate(self.state, O_T_LOCK if self.kind is None else believed())
+        o_t_lock = O_T_LOCK if self.kind is None else believed()
+        calibrate(self.state, o_t_lock, read_bounds(path))
 
     @property
     def state(self) -> Path:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import math
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
@@ -68,6 +71,45 @@ def attempt(number: int = 0, **changes: Any) -> pipe.Try:
     return pipe.Try(run="run-1", trial=Trial(**(facts | changes)))
 
 
+def typed(word: str) -> Line:
+    """Return a line that is typed just now."""
+    return Line(word, time.monotonic())
+
+
+def answering(word: str) -> Line:
+    """Return a line that will have been typed after whatever is asked next."""
+    return Line(word, math.inf)
+
+
+class Spy:
+    """Passes everything on to a stage and counts what moves it; may interfere."""
+
+    def __init__(self, interfere: Callable[[Any, str], None] = lambda _stage, _what: None) -> None:
+        self.stage = stage()
+        self.moves: list[str] = []
+        self.interfere = interfere
+
+    def __getattr__(self, name: str) -> Any:
+        if name in {"move_free", "contact", "ref"}:
+            return lambda *args: self._move(name, *args)
+        return getattr(self.stage, name)
+
+    def _move(self, name: str, *args: Any) -> Any:
+        self.moves.append(name)
+        self.interfere(self.stage, name)
+        made = getattr(self.stage, name)(*args)
+        return self if name == "contact" else made
+
+
+def lying(**lies: Any) -> Any:
+    """Return a stage whose samples can be made to lie: ``.lies`` replaces fields."""
+    port = stage()
+    true = port.sample
+    port.lies = dict(lies)
+    port.sample = lambda: true()._replace(**port.lies)
+    return port
+
+
 @dataclass
 class Rig:
     """An arm on a port, driven step by step: the loop of its process without the process."""
@@ -107,7 +149,7 @@ class Rig:
         """Have the operator type, and the arm act on it."""
         over = None
         for word in words:
-            over = self.arm.handle(Line(word))
+            over = self.arm.handle(typed(word))
         return over
 
     def tick(self) -> None:

@@ -1,4 +1,4 @@
-"""The arm's machine on the simulated stage: what moves it, and what does not."""
+"""The arm's machine on the simulated stage: trials, the key, wear, and the worker's wishes."""
 
 from __future__ import annotations
 
@@ -9,72 +9,17 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from evaluator.robot.rig import Rig, attempt, bounds, stage, theta
+from evaluator.robot.rig import Rig, Spy, attempt, bounds, stage, theta
 
 from shearline.evaluator.robot import pipe
-from shearline.evaluator.robot.errors import Ending, MotionEnded
 from shearline.evaluator.robot.peer import Gone
-from shearline.evaluator.robot.port import Mode
 from shearline.evaluator.robot.spool import Spool
 from shearline.evaluator.robot.states import State
 from shearline.evaluator.robot.store import Store
-from shearline.evaluator.robot.terminal import Closed, Line
+from shearline.evaluator.robot.terminal import Closed
 from shearline.protocol.messages import OutcomeKind
 
 Make = Callable[..., Rig]
-
-
-class Spy:
-    """Passes everything on to a stage and counts what moves it; may interfere."""
-
-    def __init__(self, interfere: Callable[[Any, str], None] = lambda _stage, _what: None) -> None:
-        self.stage = stage()
-        self.moves: list[str] = []
-        self.interfere = interfere
-
-    def __getattr__(self, name: str) -> Any:
-        if name in {"move_free", "contact", "ref"}:
-            return lambda *args: self._move(name, *args)
-        return getattr(self.stage, name)
-
-    def _move(self, name: str, *args: Any) -> Any:
-        self.moves.append(name)
-        self.interfere(self.stage, name)
-        made = getattr(self.stage, name)(*args)
-        return self if name == "contact" else made
-
-
-def lying(**lies: Any) -> Any:
-    """Return a stage whose samples can be made to lie: ``.lies`` replaces fields."""
-    port = stage()
-    true = port.sample
-    port.lies = dict(lies)
-    port.sample = lambda: true()._replace(**port.lies)
-    return port
-
-
-# -- arming --------------------------------------------------------------------------------------
-
-
-def test_nothing_moves_before_an_operator_confirms(rig: Make) -> None:
-    spy = Spy()
-    arm = rig(spy)
-    for number in range(3):
-        answer = arm.run(attempt(number))
-        assert answer.result.kind is OutcomeKind.ABORTED
-        assert "waits for its operator" in answer.result.why
-    arm.type("", "yes", "resume", "recover", "go")
-    assert spy.moves == []
-    assert arm.state is State.IDLE
-    assert not arm.takes()
-
-
-def test_a_confirmed_arm_rehearses_slowly_and_then_takes_trials(rig: Make) -> None:
-    arm = rig().armed()
-    assert "rehearsal: success" in arm.printed
-    assert arm.takes()
-    log = arm.port.drain_log()
-    assert len(log) < 100  # the rehearsal's log went with it
 
 
 def test_a_trial_succeeds_with_the_cost_and_names_of_the_simulated_one(rig: Make) -> None:
@@ -126,108 +71,6 @@ def test_the_same_attempt_twice_is_one_motion_and_the_same_answer(rig: Make) -> 
     spy.moves.clear()
     assert arm.run(attempt()) == first
     assert spy.moves == []
-
-
-def test_step_asks_before_every_trial(rig: Make) -> None:
-    arm = rig(step=True).armed()
-    arm.inbox.put(Line("no"))
-    assert "did not grant" in arm.run(attempt(1)).result.why
-    arm.inbox.put(Line("go"))
-    assert arm.run(attempt(2)).result.kind is OutcomeKind.SUCCESS
-
-
-# -- stops and faults ----------------------------------------------------------------------------
-
-
-def user_stop(port: Any, what: str) -> None:
-    if what == "ref":
-        raise MotionEnded(Ending.USER_STOP, "the user stop was pressed")
-    port.sample()
-
-
-def test_a_user_stop_holds_the_arm_until_the_operator_recovers_and_confirms(rig: Make) -> None:
-    spy = Spy()
-    arm = rig(spy).armed()
-    spy.interfere = user_stop
-    answer = arm.run(attempt())
-    assert answer.result.kind is OutcomeKind.ABORTED
-    assert arm.state is State.HOLD
-    assert not arm.takes()
-    spy.interfere = lambda *_: None  # the button is released
-    spy.moves.clear()
-    for number in range(1, 4):
-        arm.tick()
-        arm.run(attempt(number))
-    assert spy.moves == []
-    assert arm.store.key_in_lock
-    arm.type("recover")
-    assert (arm.state, spy.moves) == (State.IDLE, [])
-    arm.armed()
-    assert "pulling out the key" in arm.printed
-    assert not arm.store.key_in_lock
-
-
-def test_exactly_one_result_is_kept_for_a_stopped_trial(rig: Make) -> None:
-    spy = Spy()
-    arm = rig(spy).armed()
-    spy.interfere = user_stop
-    asked = attempt()
-    arm.run(asked)
-    arm.run(asked)
-    (kept,) = Spool(arm.store.folder / "spool").pending("run-1")
-    assert (kept.token, kept.kind) == (asked.trial.token, OutcomeKind.ABORTED)
-
-
-def test_the_log_of_a_stopped_trial_is_written(rig: Make) -> None:
-    spy = Spy()
-    arm = rig(spy).armed()
-    spy.interfere = user_stop
-    arm.run(attempt())
-    (path,) = (arm.store.folder / "logs").glob("*.npy")
-    log = np.load(path)
-    np.testing.assert_allclose(np.diff(log[:, 0]), 1e-3, atol=1e-9)
-
-
-def test_the_operators_stop_brakes_at_once_and_holds(rig: Make) -> None:
-    arm = rig().armed()
-    arm.port.stop()
-    arm.type("stop")
-    assert arm.state is State.HOLD
-    with pytest.raises(MotionEnded):
-        arm.port.contact(None)  # type: ignore[arg-type]  # latched: nobody looks at it
-
-
-@pytest.mark.parametrize(
-    "lies",
-    [
-        {"o_f_ext": np.zeros(6)},
-        {"q": np.full(3, np.nan)},
-        {"o_t_ee": np.zeros((4, 4))},
-        {"t_s": 0.0},
-    ],
-    ids=["zero wrench", "nan", "no pose", "clock"],
-)
-def test_a_port_that_lies_is_a_fault_and_never_a_cost(rig: Make, lies: dict[str, Any]) -> None:
-    port = lying()
-    arm = rig(port).armed()
-    port.lies |= lies
-    answer = arm.run(attempt())
-    assert answer.result.kind is OutcomeKind.ABORTED
-    assert arm.state is State.FAULT
-
-
-def test_a_stop_seen_between_trials_holds_the_arm(rig: Make) -> None:
-    port = lying()
-    arm = rig(port).armed()
-    port.lies["mode"] = Mode.USER_STOPPED
-    arm.tick()
-    assert arm.state is State.HOLD
-
-
-def test_a_trial_does_not_begin_with_the_key_in_the_lock(rig: Make) -> None:
-    arm = rig(stage("hand")).armed_or_not()
-    assert arm.state is State.FAULT
-    assert "free the key first" in arm.printed
 
 
 # -- the key -------------------------------------------------------------------------------------
@@ -317,18 +160,6 @@ def test_a_hold_pauses_the_arm_and_a_resume_ends_that(rig: Make) -> None:
     arm.arm.peer.held = False
     arm.tick()
     assert (arm.state, arm.takes()) == (State.READY, True)
-
-
-def test_what_the_operator_paused_no_learner_resumes(rig: Make) -> None:
-    arm = rig().armed()
-    arm.type("pause")
-    arm.tick()
-    arm.arm.peer.held = False
-    arm.tick()
-    paused = arm.state
-    arm.type("resume")
-    arm.tick()
-    assert (paused, arm.state) == (State.PAUSED, State.READY)
 
 
 def test_a_wish_to_stop_ends_the_trial_and_brings_the_key_out(rig: Make) -> None:

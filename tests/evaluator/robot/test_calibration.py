@@ -10,11 +10,13 @@ from evaluator.robot.rig import O_T_LOCK
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shearline.evaluator.robot.bounds import ToolTable
 from shearline.evaluator.robot.calibration import REPEATS, SPREAD_M, calibrated, mean_pose
 from shearline.evaluator.robot.errors import RobotRefused
 from shearline.evaluator.robot.frames import angle, apart, inverse, is_pose, pose, rpy
 
 SEATED_M = 0.025
+TOOL = ToolTable()
 angles = st.tuples(*[st.floats(-1.4, 1.4)] * 3)
 
 
@@ -28,7 +30,7 @@ def shown(spread_m: float, spread_rad: float = 0.0) -> np.ndarray:
 
 
 def test_the_mouth_lies_before_the_seated_tip_by_its_depth() -> None:
-    found = calibrated(shown(1e-4), SEATED_M)
+    found = calibrated(shown(1e-4), TOOL, SEATED_M)
     off_m, off_rad = apart(O_T_LOCK, found.pose())
     assert off_m < 1e-9
     assert off_rad < 1e-9
@@ -40,17 +42,17 @@ def test_the_mouth_lies_before_the_seated_tip_by_its_depth() -> None:
 )
 def test_repeats_that_do_not_agree_are_refused(spread_m: float, spread_rad: float) -> None:
     with pytest.raises(RobotRefused, match="off their mean"):
-        calibrated(shown(spread_m, spread_rad), SEATED_M)
+        calibrated(shown(spread_m, spread_rad), TOOL, SEATED_M)
 
 
 def test_one_pose_five_times_is_no_calibration() -> None:
     with pytest.raises(RobotRefused, match="take the key out"):
-        calibrated(shown(0.0), SEATED_M)
+        calibrated(shown(0.0), TOOL, SEATED_M)
 
 
 def test_too_few_repeats_are_refused() -> None:
     with pytest.raises(RobotRefused, match="show it 5 times"):
-        calibrated(shown(1e-4)[:3], SEATED_M)
+        calibrated(shown(1e-4)[:3], TOOL, SEATED_M)
 
 
 @given(angles, angles)

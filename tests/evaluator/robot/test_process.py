@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+import time
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -13,9 +14,10 @@ import msgspec
 import numpy as np
 import pytest
 from evaluator.robot.cell import calibrate
-from evaluator.robot.rig import EXAMPLES, O_T_LOCK, attempt, bounds, stage
+from evaluator.robot.rig import EXAMPLES, O_T_LOCK, attempt, bounds, stage, typed
 
 from shearline.evaluator.robot import pipe, process
+from shearline.evaluator.robot.bounds import read_bounds
 from shearline.evaluator.robot.errors import RobotRefused
 from shearline.evaluator.robot.load import load_port
 from shearline.evaluator.robot.local import calibrate as by_hand
@@ -25,7 +27,7 @@ from shearline.evaluator.robot.port import Mode
 from shearline.evaluator.robot.process import Orders, listen, main, run
 from shearline.evaluator.robot.results import Task
 from shearline.evaluator.robot.store import Store
-from shearline.evaluator.robot.terminal import Closed, Line, Terminal
+from shearline.evaluator.robot.terminal import Closed, Terminal
 from shearline.protocol.errors import ConfigError
 
 STAGE = f"{EXAMPLES / 'stage.py'}:Stage"
@@ -36,7 +38,7 @@ def orders(folder: Path, **changes: Any) -> Orders:
     path = folder / "stage.toml"
     if not path.exists():
         path.write_text((EXAMPLES / "stage.toml").read_text())
-        calibrate(folder / "stage.state", O_T_LOCK)
+        calibrate(folder / "stage.state", O_T_LOCK, read_bounds(path))
     return Orders(**({"robot": STAGE, "bounds": str(path), "mode": "dry-run"} | changes))
 
 
@@ -72,6 +74,28 @@ def test_no_calibration_is_refused(tmp_path: Path) -> None:
     over = run(asked)
     assert over.code == 4
     assert "--calibrate" in over.why
+
+
+@pytest.mark.parametrize("changed", ["[tool]\nmass_kg = 1.0\n", "[lock]\nseated_m = 0.02\n"])
+def test_a_lock_shown_with_another_tool_or_depth_is_refused(tmp_path: Path, changed: str) -> None:
+    asked = orders(tmp_path)
+    text = Path(asked.bounds).read_text()
+    Path(asked.bounds).write_text(text + changed)
+    over = run(asked)
+    assert over.code == 4
+    assert "the lock was shown with another tool" in over.why
+
+
+def test_a_mistake_of_the_program_is_told_to_the_worker(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def mistaken(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(process, "load_port", mistaken)
+    over = run(orders(tmp_path))
+    assert (over.code, over.why) == (4, "the arm's process failed: ZeroDivisionError()")
+    assert "Traceback" in caplog.text
 
 
 def test_bounds_for_another_number_of_joints_are_refused(tmp_path: Path) -> None:
@@ -133,7 +157,7 @@ def test_the_process_says_its_end_where_nobody_else_will(
 def test_hovering_moves_away_from_the_lock_and_never_touches_it(store: Store) -> None:
     screen, _, inbox = terminal()
     port = stage()
-    inbox.put(Line("confirm"))
+    inbox.put(typed("confirm"))
     over = hover(port, bounds(), Task(), screen, inbox, O_T_LOCK)
     assert "it counts for nothing" in over.why
     height = port.drain_log()[:, 13 + 11]
@@ -144,7 +168,7 @@ def test_hovering_moves_away_from_the_lock_and_never_touches_it(store: Store) ->
 @pytest.mark.parametrize("word", ["no", "", None])
 def test_hovering_needs_a_confirmation(word: str | None) -> None:
     screen, _, inbox = terminal()
-    inbox.put(Closed() if word is None else Line(word))
+    inbox.put(Closed() if word is None else typed(word))
     port = stage()
     assert "nothing has moved" in hover(port, bounds(), Task(), screen, inbox, O_T_LOCK).why
     assert len(port.drain_log()) == 0
@@ -152,7 +176,7 @@ def test_hovering_needs_a_confirmation(word: str | None) -> None:
 
 def test_hovering_with_the_key_in_the_lock_is_refused() -> None:
     screen, _, inbox = terminal()
-    inbox.put(Line("confirm"))
+    inbox.put(typed("confirm"))
     with pytest.raises(RobotRefused, match="free the key first"):
         hover(stage("hand"), bounds(), Task(), screen, inbox, O_T_LOCK)
 
@@ -160,7 +184,7 @@ def test_hovering_with_the_key_in_the_lock_is_refused() -> None:
 def test_the_lock_is_shown_by_hand_and_found_where_it_is(store: Store) -> None:
     screen, heard, inbox = terminal()
     for word in ("what", *["here"] * 5):
-        inbox.put(Line(word))
+        inbox.put(typed(word))
     over = by_hand(stage("hand"), bounds(), store, screen, inbox)
     assert "5 repeats within" in over.why
     found = store.calibration()
@@ -171,7 +195,7 @@ def test_the_lock_is_shown_by_hand_and_found_where_it_is(store: Store) -> None:
 
 def test_a_calibration_that_is_given_up_leaves_the_one_before(store: Store) -> None:
     screen, _, inbox = terminal()
-    inbox.put(Line("here"))
+    inbox.put(typed("here"))
     inbox.put(Closed())
     with pytest.raises(RobotRefused, match="given up"):
         by_hand(stage("hand"), bounds(), store, screen, inbox)
@@ -180,7 +204,10 @@ def test_a_calibration_that_is_given_up_leaves_the_one_before(store: Store) -> N
 
 @pytest.mark.parametrize(
     ("lie", "why"),
-    [({"dq": np.ones(3)}, "still moves"), ({"o_t_ee": np.full((4, 4), np.nan)}, "no finite pose")],
+    [
+        ({"dq": np.ones(3)}, "still moves"),
+        ({"o_t_ee": np.full((4, 4), np.nan)}, "no pose: nothing was taken"),
+    ],
 )
 def test_an_arm_that_moves_or_lies_shows_nothing(
     store: Store, lie: dict[str, Any], why: str
@@ -189,8 +216,8 @@ def test_an_arm_that_moves_or_lies_shows_nothing(
     port = stage("hand")
     true = port.sample
     port.sample = lambda: true()._replace(**lie)
-    inbox.put(Line("here"))
-    inbox.put(Line("quit"))
+    inbox.put(typed("here"))
+    inbox.put(typed("quit"))
     with pytest.raises(RobotRefused):
         by_hand(port, bounds(), store, screen, inbox)
     assert why in heard.getvalue()
@@ -211,7 +238,9 @@ def test_the_word_stop_is_acted_upon_by_the_thread_that_reads_it() -> None:
     inbox: SimpleQueue[Any] = SimpleQueue()
     screen = Terminal(inbox, lambda: stops.append(True), io.StringIO(" STOP \nconfirm\n"))
     screen.start()
-    assert [inbox.get(timeout=5.0) for _ in range(3)] == [Line("stop"), Line("confirm"), Closed()]
+    stop, confirm, end = (inbox.get(timeout=5.0) for _ in range(3))
+    assert (stop.text, confirm.text, end) == ("stop", "confirm", Closed())
+    assert stop.at_s <= confirm.at_s <= time.monotonic()
     assert stops == [True]
 
 

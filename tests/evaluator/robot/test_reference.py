@@ -51,7 +51,7 @@ def test_a_reference_never_moves_faster_than_it_may(goal: list[float], pace: flo
     reference.begin(np.zeros(3), np.zeros(3))
     before = reference.pose(np.eye(4))
     for _ in range(5):
-        reference.toward(np.array(goal), np.zeros(3), DT_S)
+        reference.toward(np.array(goal), np.zeros(3), np.zeros(3), DT_S)
         after = reference.pose(np.eye(4))
         step = np.linalg.norm(after[:3, 3] - before[:3, 3])
         assert step <= pace * limits.reference_mps * DT_S * (1.0 + 1e-9)
@@ -59,11 +59,24 @@ def test_a_reference_never_moves_faster_than_it_may(goal: list[float], pace: flo
         before = after
 
 
-def test_what_the_clip_takes_away_is_counted() -> None:
+@pytest.mark.parametrize(
+    ("axis", "within", "beyond"), [(0, 0.019, 0.021), (3, 0.049, 0.051)], ids=["force", "torque"]
+)
+def test_what_the_clip_takes_away_is_counted(axis: int, within: float, beyond: float) -> None:
     reference = Reference(bounds(), 1.0)
-    reference.begin(np.zeros(3), np.zeros(3))
-    reference.toward(np.array([0.019, 0, 0, 0, 0, 0]), np.zeros(3), DT_S)
-    reference.toward(np.array([0.021, 0, 0, 0, 0, 0]), np.zeros(3), DT_S)
+    for asked in (within, beyond):
+        target = np.eye(6)[axis] * asked
+        reference.begin(target[:3], target[3:])  # there already: no speed is in the way
+        reference.toward(target, np.zeros(3), np.zeros(3), DT_S)
+    assert reference.clipped_share == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("axis", "speed"), [(0, 0.2), (4, 1.0)], ids=["m/s", "rad/s"])
+def test_what_the_references_speed_takes_away_is_counted(axis: int, speed: float) -> None:
+    reference = Reference(bounds(), 1.0)
+    for asked in (0.9 * speed * DT_S, 1.1 * speed * DT_S):
+        reference.begin(np.zeros(3), np.zeros(3))
+        reference.toward(np.eye(6)[axis] * asked, np.zeros(3), np.zeros(3), DT_S)
     assert reference.clipped_share == pytest.approx(0.5)
 
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from shearline.evaluator.robot import store as stores
+from shearline.evaluator.robot.bounds import ToolTable
 from shearline.evaluator.robot.errors import RobotRefused
 from shearline.evaluator.robot.spool import Spool
-from shearline.evaluator.robot.store import Store, Wear
+from shearline.evaluator.robot.store import Calibration, Store, Wear
 from shearline.protocol.messages import OutcomeKind, Result
 
 
@@ -46,6 +47,27 @@ def test_a_damaged_file_is_refused_rather_than_forgotten(store: Store, name: str
     (store.folder / name).write_text("{")
     with pytest.raises(RobotRefused, match="damaged"):
         (store.wear if name == "wear.json" else store.calibration)()
+
+
+@pytest.mark.parametrize("pose", [[0.0] * 16, [1.0] * 15])
+def test_a_calibration_that_is_no_pose_is_refused(store: Store, pose: list[float]) -> None:
+    shown = Calibration(
+        o_t_lock=tuple(pose),
+        spread_m=0,
+        spread_rad=0,
+        repeats=5,
+        at="",
+        tool=ToolTable(),
+        seated_m=0.025,
+    )
+    store.set_calibration(shown)
+    with pytest.raises(RobotRefused):
+        store.calibration()
+
+
+def test_a_diary_that_cannot_be_written_stops_nothing(store: Store) -> None:
+    (store.folder / "diary.jsonl").mkdir()
+    store.note("typed", word="stop")
 
 
 def test_the_marker_of_the_key_stays_until_it_is_cleared(store: Store) -> None:

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from shearline.evaluator.robot import pipe
-from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotError
-from shearline.evaluator.robot.motions import PATIENCE_S, Mover
+from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotError, RobotRefused
+from shearline.evaluator.robot.motions import FAULTS, PATIENCE_S, Mover
 from shearline.evaluator.robot.peer import Gone
 from shearline.evaluator.robot.port import Array
 from shearline.evaluator.robot.results import Cell, Ran, result_of
@@ -26,7 +26,6 @@ from shearline.evaluator.robot.states import STUCK, Cause, State
 from shearline.evaluator.robot.store import worn
 from shearline.evaluator.robot.terminal import STOP, Closed, Line, consent
 from shearline.evaluator.robot.trial import Report, Work
-from shearline.evaluator.robot.watch import Watch
 from shearline.protocol.messages import OutcomeKind
 
 #: Share of the lab's speeds in the rehearsal after arming.
@@ -34,6 +33,9 @@ SLOW = 0.2
 
 #: How often the robot is looked at while nothing happens [s].
 IDLE_S = 0.1
+
+#: What moves the arm, or lets it move, and so must answer what was asked last.
+CONSENTS = frozenset({"confirm", "recover", "replaced key", "replaced lock"})
 
 #: Attempts whose answer is remembered, so that the same one twice is one motion.
 ANSWERS_MAX = 64
@@ -63,6 +65,7 @@ class Arm(Mover):
     def serve(self) -> pipe.Over:
         """Take part until the worker, the operator or a signal ends it."""
         self.begin()
+        self._terminal.start()
         while True:
             try:
                 item = self.inbox.get(timeout=IDLE_S)
@@ -80,17 +83,21 @@ class Arm(Mover):
     def handle(self, item: object) -> pipe.Over | None:
         """Act upon one thing that came, or upon nothing; return how it ended, if it did."""
         self.alive()
-        over = self._act(item)
-        if over is None:
-            self._idle()
+        try:
+            over = self._act(item)
+            if over is None:
+                self._idle()
+        except FAULTS as fault:
+            self._break(fault)
+            return None
         return over
 
     def _act(self, item: object) -> pipe.Over | None:
         match item:
             case pipe.Try():
                 self._answer(item)
-            case Line(text):
-                return self._typed(text)
+            case Line(text, at_s):
+                return self._typed(text, at_s)
             case Closed():
                 return self._leave("the terminal is gone: nobody could stop or recover the arm")
             case Gone():
@@ -108,14 +115,17 @@ class Arm(Mover):
         return pipe.Over(code=0 if armed else 4, why=why)
 
     def _idle(self) -> None:
-        """Look at the robot between trials, and follow the learner's hold."""
+        """Look at the robot between trials, and follow the learner's hold.
+
+        Raises:
+            MotionEnded: If it stopped, cannot be trusted, or somebody leads it though it is armed.
+        """
         if self.state in STUCK or self.state is State.OFFLINE:
             return
-        try:
+        if self.state is State.IDLE:
             self._watch.look()
-        except MotionEnded as ended:
-            self._break(ended)
-            return
+        else:
+            self._must_be_left()
         held = self.peer.held or self._paused_here
         if held and self.state is State.READY:
             self._enter(Cause.PAUSE, "no trial is taken")
@@ -124,8 +134,12 @@ class Arm(Mover):
 
     # -- the operator ----------------------------------------------------------------------------
 
-    def _typed(self, word: str) -> pipe.Over | None:
+    def _typed(self, word: str, at_s: float) -> pipe.Over | None:
         self._store.note("typed", word=word[:80], state=self.state)
+        if word in CONSENTS and at_s < self._asked_s:
+            self._terminal.say(f"'{word}' was typed before this was asked, and does not count")
+            self._prompt()
+            return None
         match word, self.state:
             case "quit", _:
                 return self._leave("ended by the operator")
@@ -133,6 +147,8 @@ class Arm(Mover):
                 self._paused_here = word == "pause"
             case "confirm", State.IDLE:
                 self._arm()
+            case "confirm", State.READY if not self._rehearsed:
+                self._rehearse()
             case "recover", State.HOLD | State.FAULT | State.JAMMED:
                 self._recover()
             case (("replaced key" | "replaced lock"), State.WORN):
@@ -150,14 +166,13 @@ class Arm(Mover):
             return
         self.peer.halt_why = ""
         self._watch.refresh()
+        self._must_stand()
         try:
-            self._must_stand()
-            self._port.set_guard(self._bounds.port_guard())
-        except MotionEnded as ended:
-            self._break(ended)
-            return
-        except RobotError as refused:
+            with self._watch.blocked():  # a jammed key's pull is no zero
+                self._port.set_guard(self._bounds.port_guard(), tare=not self._store.key_in_lock)
+        except RobotRefused as refused:
             self._terminal.say(f"not armed: {refused}")
+            self._prompt()
             return
         self._store.note("armed", bounds=self._bounds.hash, engine=self._port.engine)
         if self._store.key_in_lock:
@@ -173,11 +188,11 @@ class Arm(Mover):
         self.alive(PATIENCE_S)
         try:
             self._port.recover(consent("recover"))
-        except (RobotError, MotionEnded) as fault:
+        except RobotError as fault:
             self._terminal.say(f"not recovered: {fault}")
             self._prompt()
             return
-        self._watch = Watch(self._port, self._halt)
+        self._watch = self._watching()
         self._rehearsed = False
         self._enter(Cause.RECOVER, "recovered; nothing moves before you confirm")
         self._prompt()
@@ -196,13 +211,16 @@ class Arm(Mover):
         token = asked.trial.token
         if token not in self._answers:
             began_s = time.monotonic()
-            ran = self._attempt(asked)
+            ran = self._served(asked)
             result, trace = result_of(
                 asked.trial, replace(ran, wall_s=time.monotonic() - began_s), self._cell()
             )
-            if ran.kind is OutcomeKind.ABORTED and len(ran.log):
-                self._store.keep_log(f"trial-{asked.trial.trial}-{time.time_ns()}", ran.log)
-            self._spool.put(asked.run, result)
+            try:
+                self._spool.put(asked.run, result)
+                if ran.kind is OutcomeKind.ABORTED and len(ran.log):
+                    self._store.keep_log(f"trial-{asked.trial.trial}-{time.time_ns()}", ran.log)
+            except OSError as full:  # it is still said
+                self._break(full)
             self._answers[token] = pipe.Answer(result=result, trace=trace)
             while len(self._answers) > ANSWERS_MAX:
                 self._answers.popitem(last=False)
@@ -211,6 +229,17 @@ class Arm(Mover):
 
     def _cell(self) -> Cell:
         return Cell(self._task, self._bounds, self._port.joints, self.engine, self._o_t_lock)
+
+    def _served(self, asked: pipe.Try) -> Ran:
+        """Run an attempt for the learner; whatever goes wrong, it has an answer."""
+        self._serving = True
+        try:
+            return self._attempt(asked)
+        except FAULTS as fault:
+            self._break(fault)
+            return Ran(OutcomeKind.ABORTED, str(fault))
+        finally:
+            self._serving = False
 
     def _attempt(self, asked: pipe.Try) -> Ran:
         theta = np.array(asked.trial.theta)
@@ -225,21 +254,27 @@ class Arm(Mover):
         return self._perform(self._work(theta, 1.0))
 
     def _granted(self, asked: pipe.Try) -> bool:
-        """Ask for one trial in ``--step``; anything but 'go' is a no."""
-        self._terminal.say(f"trial {asked.trial.trial}: type 'go' to run it, anything else to skip")
-        while True:
+        """Ask for one trial in ``--step``; anything but 'go' is a no.
+
+        Raises:
+            MotionEnded: If the robot stopped, or somebody leads it, meanwhile.
+        """
+        self._ask(f"trial {asked.trial.trial}: type 'go' to run it, anything else to skip")
+        while not (self.peer.halt_why or self.peer.leaving):
             self.alive()
+            self._must_be_left()
             try:
                 item = self.inbox.get(timeout=IDLE_S)
             except Empty:
-                if self.peer.halt_why or self.peer.leaving:
-                    return False
                 continue
-            if isinstance(item, Line):
-                return item.text == "go"
+            if isinstance(item, Line) and item.text == "go":
+                if item.at_s >= self._asked_s:
+                    return True
+                self._terminal.say("'go' was typed before this was asked, and does not count")
+                continue
             self.inbox.put(item)  # for the loop, once this is answered
-            if not isinstance(item, pipe.Look):
-                return False
+            return False
+        return False
 
     def _work(self, theta: Array, pace: float) -> Work:
         p, limits = self._task.work(theta, self._bounds, self._port.joints)
@@ -252,8 +287,11 @@ class Arm(Mover):
         if self.state is not State.READY:
             return
         verdict = ran.why or self._task.verdict(ran.report)
-        self._terminal.say(f"rehearsal: {verdict}")
         self._store.note("rehearsed", verdict=verdict)
+        self._terminal.say(f"rehearsal: {verdict}")
+        if ran.kind is not OutcomeKind.SUCCESS:
+            self._prompt()
+            return
         self._rehearsed = True
         self._tell("ready for trials")
 

@@ -12,6 +12,7 @@ import time
 
 import numpy as np
 
+from shearline.evaluator.robot.bounds import ToolTable
 from shearline.evaluator.robot.errors import RobotRefused
 from shearline.evaluator.robot.frames import apart, pose
 from shearline.evaluator.robot.port import Array
@@ -38,11 +39,12 @@ def mean_pose(poses: Array) -> Array:
     return pose(poses[:, :3, 3].mean(axis=0), left @ sign @ right)
 
 
-def calibrated(poses: Array, seated_m: float) -> Calibration:
+def calibrated(poses: Array, tool: ToolTable, seated_m: float) -> Calibration:
     """Return the lock's pose from what the hand showed.
 
     Args:
         poses: Of the tip while the key sat in the lock ``(n, 4, 4)``.
+        tool: What hung on the flange.
         seated_m: How deep the tip is then [m].
 
     Raises:
@@ -68,4 +70,6 @@ def calibrated(poses: Array, seated_m: float) -> Calibration:
         spread_rad=spread_rad,
         repeats=len(poses),
         at=time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        tool=tool,
+        seated_m=seated_m,
     )

@@ -87,26 +87,27 @@ def _climb(
     if is_clear(view):
         return True
     _pull(c, view, 0, rung, work)
-    session = port.contact(contact_of(c, work.o_t_lock, work.bounds, most_s / work.pace + 1.0))
+    with watch.blocked():
+        session = port.contact(contact_of(c, work.o_t_lock, work.bounds, most_s / work.pace + 1.0))
     view = sight.view(watch.look())
     begin_s, tick = view.t_s, 0
+    report.begun(view.t_s)
     reference.begin(view.tip, view.turn)
-    seen: list[float] = []
     try:
         while not is_clear(view) and view.t_s - begin_s < most_s / work.pace:
             tick += 1
             _pull(c, view, tick, rung, work)
-            reference.toward(target_of(c, view.speed_z), view.tip, work.tick_s)
+            reference.toward(target_of(c, view.speed_z), view.tip, view.turn, work.tick_s)
             session.ref(reference.pose(work.o_t_lock))
+            report.ran_until(view.t_s)
             view = sight.view(watch.until(view.t_s + work.tick_s))
-            seen += [view.t_s] if view.moving else []
             report.notes.append((view.t_s, EXTRACTION, c.x[0], c.x[1], *[0.0] * 5))
-        session.end()
+        with watch.blocked():
+            session.end()
+        report.ran_until(view.t_s)
     except MotionEnded as ended:
         if ended.ending not in {Ending.GUARD, Ending.TIME}:
             raise
-    finally:
-        report.stretches += [(seen[0], seen[-1])] if seen else []
     return is_clear(view)
 
 

@@ -12,7 +12,7 @@ from shearline.evaluator.robot.calibration import REPEATS, calibrated
 from shearline.evaluator.robot.errors import MotionEnded, RobotRefused
 from shearline.evaluator.robot.frames import apart, in_lock
 from shearline.evaluator.robot.pipe import Over
-from shearline.evaluator.robot.port import Array, RobotPort, Sample
+from shearline.evaluator.robot.port import Array, RobotPort
 from shearline.evaluator.robot.results import Task
 from shearline.evaluator.robot.store import Store
 from shearline.evaluator.robot.terminal import Closed, Line, Terminal
@@ -76,8 +76,9 @@ def hover(
     p, limits = task.work(bounds.canary_tuple(), bounds, port.joints)
     work, report, watch = Work(p, limits, away, bounds, HOVER_PACE), Report(), Watch(port)
     try:
-        port.set_guard(bounds.port_guard())
         must_be_free(watch, o_t_lock)
+        port.set_guard(bounds.port_guard())
+        watch.refresh()
         to_start(port, watch, work)
         insertion = Insertion(port, watch, work, report)
         insertion.approach()
@@ -99,6 +100,7 @@ def calibrate(
     """
     terminal.say("calibration: lead the arm by hand until the key sits in the lock, and let go")
     poses: list[Array] = []
+    watch = Watch(port)
     while len(poses) < REPEATS:
         terminal.say(f"repeat {len(poses) + 1} of {REPEATS}: type 'here' when it sits and is still")
         word = _line(inbox)
@@ -106,24 +108,20 @@ def calibrate(
             raise RobotRefused("the calibration was given up: the one before stays")
         if word != "here":
             continue
-        sample = port.sample()
-        if why := _unfit(sample):
-            terminal.say(why)
+        try:
+            sample = watch.look()
+        except MotionEnded as lie:
+            terminal.say(f"{lie}: nothing was taken")
+            continue
+        if np.abs(sample.dq).max() > STILL:
+            terminal.say("the arm still moves: let go, wait, and type 'here' again")
             continue
         poses.append(sample.o_t_ee.copy())
-    found = calibrated(np.array(poses), bounds.lock.seated_m)
+    found = calibrated(np.array(poses), bounds.tool, bounds.lock.seated_m)
     store.set_calibration(found)
     store.note("calibrated", spread_mm=found.spread_m * 1e3, bounds=bounds.hash)
     spread = f"{found.spread_m * 1e3:.3f} mm and {np.degrees(found.spread_rad):.3f} deg"
     return Over(code=0, why=f"calibrated: {REPEATS} repeats within {spread} of their mean")
-
-
-def _unfit(sample: Sample) -> str:
-    if not np.isfinite(sample.o_t_ee).all():
-        return "the robot says no finite pose: nothing was taken"
-    if np.abs(sample.dq).max() > STILL:
-        return "the arm still moves: let go, wait, and type 'here' again"
-    return ""
 
 
 def _line(inbox: SimpleQueue[Any]) -> str | None:

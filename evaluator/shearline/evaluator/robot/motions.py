@@ -6,12 +6,16 @@ halt brings the key out, a stop holds the arm, anything that cannot be trusted i
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 
+import numpy as np
+
 from shearline.evaluator.robot import pipe
 from shearline.evaluator.robot.bounds import Bounds
-from shearline.evaluator.robot.errors import Ending, MotionEnded
+from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotError
+from shearline.evaluator.robot.frames import apart
 from shearline.evaluator.robot.ladder import RUNGS, extract
 from shearline.evaluator.robot.log import missing
 from shearline.evaluator.robot.peer import Peer
@@ -30,6 +34,9 @@ PATIENCE_S = 45.0
 
 #: Rung of the ladder that needs no word.
 GENTLEST = RUNGS[0][0]
+
+#: What may come of a call of the port or of the disk; each of them leads to a state.
+FAULTS = (RobotError, OSError)
 
 _HELD = frozenset({Ending.USER_STOP, Ending.STOPPED})
 _WORKING = MOVING | {State.READY}
@@ -69,7 +76,10 @@ class Mover:
         self._terminal = terminal
         self._say = say
         self._o_t_lock = o_t_lock
-        self._watch = Watch(port, self._halt)
+        self._watch = self._watching()
+        self._stood: Array | None = None
+        self._serving = False
+        self._asked_s = 0.0
         self._retracting = False
         self._rehearsed = False
         self._why = ""
@@ -77,6 +87,9 @@ class Mover:
     def alive(self, patience_s: float = 1.0) -> None:
         """Say that this thread is well, and will be for so long [s]."""
         self.alive_until_s = time.monotonic() + patience_s
+
+    def _watching(self) -> Watch:
+        return Watch(self._port, self._halt, on_block=lambda: self.alive(PATIENCE_S))
 
     @property
     def engine(self) -> str:
@@ -95,16 +108,17 @@ class Mover:
             self._insert(work, report)
         except Halted as halted:
             why = str(halted)
-        except MotionEnded as ended:
-            why = str(ended)
-            if ended.ending not in _ORDINARY or self.state is not State.CONTACT:
-                self._break(ended)
+        except FAULTS as fault:
+            why = str(fault)
+            if ending_of(fault) not in _ORDINARY or self.state is not State.CONTACT:
+                self._break(fault)
         if self.state is State.APPROACH:
             self._enter(Cause.CLEAR, why)
         elif self.state is State.CONTACT:
             self._enter(Cause.OVER, "")
             self._retract(work, report)
-        log = self._port.drain_log()
+        with self._watch.blocked():
+            log = self._port.drain_log()
         lacking = missing(log, report.stretches)
         if lacking and not why:
             why = f"the robot's log lacks {lacking} cycles of the contact"
@@ -114,8 +128,7 @@ class Mover:
         return Ran(OutcomeKind.SUCCESS if won else OutcomeKind.FAILURE, "", report, log)
 
     def _insert(self, work: Work, report: Report) -> None:
-        self._must_stand()
-        self.alive(PATIENCE_S)
+        self._must_be_left()
         must_be_free(self._watch, self._o_t_lock)
         to_start(self._port, self._watch, work)
         insertion = Insertion(self._port, self._watch, work, report)
@@ -131,19 +144,17 @@ class Mover:
         """Bring the key out, up the ladder, and the arm back to the start pose."""
         self._retracting = True
         try:
-            self.alive(PATIENCE_S)
             rung = extract(self._port, self._watch, work, report)
             if not rung:
                 self._enter(Cause.STUCK, "the key does not come out; the gripper stays closed")
                 self._prompt()
                 return
-            self.alive(PATIENCE_S)
-            self._port.move_free(work.start_pose(), self._bounds.start.speed_mps * work.pace)
+            with self._watch.blocked():
+                self._port.move_free(work.start_pose(), self._bounds.start.speed_mps * work.pace)
             self._store.clear_key()
-            self._watch.refresh()
             self._enter(Cause.CLEAR, "" if rung == GENTLEST else f"the key came out by a {rung}")
-        except MotionEnded as ended:
-            self._break(ended)
+        except FAULTS as fault:
+            self._break(fault)
         finally:
             self._retracting = False
 
@@ -152,13 +163,32 @@ class Mover:
         if sample.mode is not Mode.IDLE:
             raise MotionEnded(Ending.INVALID, f"the robot is {sample.mode}, not idle")
 
+    def _must_be_left(self) -> None:
+        """Make sure that nobody leads the armed arm, or has led it since it was armed or stood.
+
+        Raises:
+            MotionEnded: With ``USER_STOP`` if somebody does: what he consented to is over.
+        """
+        sample, start = self._watch.look(), self._bounds.start
+        if sample.mode is not Mode.IDLE:
+            raise MotionEnded(Ending.USER_STOP, f"the robot is {sample.mode}: somebody leads it")
+        if self._stood is None:
+            self._stood = sample.o_t_ee.copy()
+        off_m, off_rad = apart(self._stood, sample.o_t_ee)
+        if off_m > start.tolerance_m or off_rad > start.tolerance_rad:
+            raise MotionEnded(
+                Ending.USER_STOP,
+                f"the arm was moved by {off_m * 1e3:.1f} mm and {np.degrees(off_rad):.1f} deg while"
+                " it was to stand: somebody led it",
+            )
+
     def _halt(self) -> None:
         """Called at every look of a motion: a sign of life, and who wants it to end."""
         self.alive()
         if self._retracting or self.state not in MOVING:
             return
         why = self.peer.halt_why or self.peer.leaving
-        if not why and self._bounds.link_loss == "stop":
+        if not why and self._serving and self._bounds.link_loss == "stop":
             lost = self.peer.link(time.monotonic()) is Link.LOST
             why = "the learner cannot be reached, and link_loss is 'stop'" if lost else ""
         if why:
@@ -166,19 +196,21 @@ class Mover:
 
     # -- state -----------------------------------------------------------------------------------
 
-    def _break(self, ended: MotionEnded) -> None:
+    def _break(self, fault: Exception) -> None:
         """The arm was stopped, or cannot be trusted: brake, and wait for the operator."""
         self._port.stop()
-        if self.state in STUCK:
+        if self.state in STUCK or self.state is State.OFFLINE:
             return
         if self.state in MOVING and self.state is not State.APPROACH:
-            self._store.mark_key(str(ended))
-        cause = Cause.STOP if ended.ending in _HELD else Cause.FAIL
-        self._enter(cause, str(ended))
+            with contextlib.suppress(OSError):  # it was marked before it could be in there
+                self._store.mark_key(str(fault))
+        self._enter(Cause.STOP if ending_of(fault) in _HELD else Cause.FAIL, str(fault))
         self._prompt()
 
     def _enter(self, cause: Cause, why: str) -> None:
         before, self.state = self.state, advance(self.state, cause)
+        if self.state is State.READY and before is not State.PAUSED:
+            self._stood = None  # it stands where it is now
         self._why = why or self._why
         self._store.note("state", before=before, after=self.state, cause=cause, why=why)
         if why and self.state not in MOVING:
@@ -190,4 +222,15 @@ class Mover:
         self._say(pipe.Stands(state=self.state, why=why, engine=self.engine, takes=takes))
 
     def _prompt(self) -> None:
-        self._terminal.say(prompt(self.state, key_in_lock=self._store.key_in_lock))
+        key_in_lock, rehearsed = self._store.key_in_lock, self._rehearsed
+        self._ask(prompt(self.state, key_in_lock=key_in_lock, rehearsed=rehearsed))
+
+    def _ask(self, text: str) -> None:
+        """Ask the operator; what was typed before is no answer to it."""
+        self._terminal.say(text)
+        self._asked_s = time.monotonic()
+
+
+def ending_of(fault: Exception) -> Ending:
+    """Return the ending that a fault amounts to."""
+    return fault.ending if isinstance(fault, MotionEnded) else Ending.INVALID

@@ -8,6 +8,7 @@ as it takes to bring the key out, and ends by itself.
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import signal
 import sys
@@ -31,6 +32,8 @@ from shearline.evaluator.robot.results import Task
 from shearline.evaluator.robot.store import Calibration, Store
 from shearline.evaluator.robot.terminal import NOTICE, Terminal
 from shearline.protocol.errors import ConfigError, LinkError, ShearlineError
+
+log = logging.getLogger(__name__)
 
 Mode = Literal["trials", "dry-run", "hover", "calibrate"]
 
@@ -146,6 +149,9 @@ def run(orders: Orders) -> pipe.Over:
         over = pipe.Over(code=3, why=str(fault))
     except ShearlineError as fault:
         over = pipe.Over(code=4, why=str(fault))
+    except Exception as fault:  # the worker must hear of it, whatever it is
+        log.exception("the arm's process failed")
+        over = pipe.Over(code=4, why=f"the arm's process failed: {fault!r}")
     outbox.put(over)
     outbox.wait(2.0)
     return over
@@ -162,7 +168,7 @@ def _run(orders: Orders, end: pipe.Pipe | None, outbox: Outbox) -> pipe.Over:
         )
     store = Store(folder_of(path))
     try:
-        found = None if orders.mode == "calibrate" else _calibrated(store)
+        found = None if orders.mode == "calibrate" else _calibrated(store, bounds)
         port.open(bounds.port_tool())
         try:
             return _with_port(orders, port, bounds, store, found, end, outbox)
@@ -172,12 +178,17 @@ def _run(orders: Orders, end: pipe.Pipe | None, outbox: Outbox) -> pipe.Over:
         store.close()
 
 
-def _calibrated(store: Store) -> Calibration:
+def _calibrated(store: Store, bounds: Bounds) -> Calibration:
     found = store.calibration()
     if found is None:
         raise RobotRefused(
             f"nobody has shown where the lock is: no calibration in {store.folder};"
             " run this command with --calibrate first"
+        )
+    if (found.tool, found.seated_m) != (bounds.tool, bounds.lock.seated_m):
+        raise RobotRefused(
+            "the lock was shown with another tool or lock.seated_m than the bounds file has now:"
+            " run this command with --calibrate again, or restore the file"
         )
     return found
 
@@ -193,6 +204,7 @@ def _with_port(
 ) -> pipe.Over:
     inbox: SimpleQueue[Any] = SimpleQueue()
     terminal = Terminal(inbox, port.stop)
+    terminal.forget()
     terminal.say(f"{port.engine}, bounds {bounds.hash}, folder {store.folder}")
     if found is None:
         terminal.start()
@@ -211,8 +223,8 @@ def _with_port(
         step=orders.step,
     )
     outbox.arm = arm
-    terminal.start()
     if orders.mode == "hover":
+        terminal.start()
         return hover(port, bounds, Task(orders.task), terminal, inbox, found.pose())
     if end is not None:
         threading.Thread(target=listen, args=(end, inbox, arm.peer), daemon=True).start()

@@ -72,16 +72,25 @@ class Reference:
         """Start where the tip ``(3,)`` and its turn ``(3,)`` are."""
         self._at = np.concatenate([tip, turn])
 
-    def toward(self, target: Array, tip: Array, dt_s: float) -> None:
-        """Move on by ``dt_s`` [s]; the length of the step is what is limited, not each axis."""
+    def toward(self, target: Array, tip: Array, turn: Array, dt_s: float) -> None:
+        """Move on by ``dt_s`` [s]; the length of the step is what is limited, not each axis.
+
+        Args:
+            target: Where the reference would be without limits ``(6,)`` [m, rad].
+            tip: Where the tip is ``(3,)`` [m], from which the robot clips.
+            turn: How it is turned ``(3,)`` [rad].
+            dt_s: Time since the last step [s].
+        """
         off = target - self._at
+        cut = bool((np.abs(target - np.concatenate([tip, turn])) > self._clip).any())
         for part, speed in ((slice(0, 3), self._speed[0]), (slice(3, 6), self._speed[3])):
             length = float(np.linalg.norm(off[part]))
             if length > speed * dt_s:
                 off[part] *= speed * dt_s / length
+                cut = True
         self._at = self._at + off
         self.ticks += 1
-        self.clipped += bool((np.abs(target[:3] - tip) > self._clip[:3]).any())
+        self.clipped += cut
 
     def pose(self, o_t_lock: Array) -> Array:
         """Return the reference in the base frame ``(4, 4)``."""
@@ -89,5 +98,5 @@ class Reference:
 
     @property
     def clipped_share(self) -> float:
-        """Share of the ticks in which the skill asked for more force than the clip lets through."""
+        """Share of the ticks in which the skill asked for more than clip and speeds let through."""
         return self.clipped / max(self.ticks, 1)

@@ -95,8 +95,8 @@ def result_of(trial: Trial, ran: Ran, cell: Cell) -> tuple[Result, TraceData | N
     """Return an attempt's result and its trace.
 
     Extras of a trial with a verdict: ``depth_m``, ``insertion_s``, ``trial_s`` as in simulation;
-    ``clipped``, the share of ticks in which the skill asked for more force than the clip lets
-    through; ``late_ticks``, ticks made up for.
+    ``clipped``, the share of ticks in which the skill asked for more force, torque or speed of its
+    reference than the lab lets through; ``late_ticks``, ticks made up for.
     """
     report, log = ran.report, ran.log
     if not ran.is_judged:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shearline.evaluator.robot.frames import inverse
-from shearline.evaluator.robot.port import Array, Mode, Sample
+from shearline.evaluator.robot.port import Array, Sample
 
 #: The speed is a difference of poses through a first-order low-pass of this corner [Hz].
 SPEED_HZ = 30.0
@@ -24,7 +24,6 @@ class View(NamedTuple):
         speed_z: Along the axis, low-passed [m/s].
         wrench: Of the surroundings on the tip ``(6,)`` [N, N m].
         tau_ext: ``(n,)``.
-        moving: Whether the robot was in a motion of ours.
     """
 
     t_s: float
@@ -33,7 +32,6 @@ class View(NamedTuple):
     speed_z: float
     wrench: Array
     tau_ext: Array
-    moving: bool
 
 
 class Sight:
@@ -56,8 +54,7 @@ class Sight:
         self._differ(sample.t_s, float(tip[2]))
         wrench = np.concatenate([back @ sample.o_f_ext[:3], back @ sample.o_f_ext[3:]])
         tau_ext = np.ascontiguousarray(sample.tau_ext)
-        turn, moving = turn_of(at[:3, :3]), sample.mode is Mode.MOVE
-        return View(sample.t_s, tip, turn, self._speed_z, wrench, tau_ext, moving)
+        return View(sample.t_s, tip, turn_of(at[:3, :3]), self._speed_z, wrench, tau_ext)
 
     def _differ(self, t_s: float, z_m: float) -> None:
         if self._last is not None and t_s > self._last[0]:

@@ -7,18 +7,21 @@ disk before the call returns. One process holds the folder at a time.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
 import time
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import IO, Annotated, Any, TypeVar
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 
-from shearline.evaluator.robot.bounds import WearTable
+from shearline.evaluator.robot.bounds import ToolTable, WearTable
 from shearline.evaluator.robot.errors import RobotRefused
+from shearline.evaluator.robot.frames import is_pose
 from shearline.evaluator.robot.port import Array
 
 K = TypeVar("K")
@@ -127,7 +130,13 @@ class Store:
         Raises:
             RobotRefused: If the file is damaged.
         """
-        return self._read("calibration.json", Calibration, None)
+        found = self._read("calibration.json", Calibration, None)
+        if found is not None and not is_pose(found.pose()):
+            raise RobotRefused(
+                f"the lock's pose in {self.folder / 'calibration.json'} is no pose:"
+                " run this command with --calibrate again"
+            )
+        return found
 
     def set_calibration(self, calibration: Calibration) -> None:
         """Replace it."""
@@ -136,9 +145,9 @@ class Store:
     # -- what happened ---------------------------------------------------------------------------
 
     def note(self, what: str, **facts: Any) -> None:
-        """Add a line to the diary."""
+        """Add a line to the diary; a disk that is full is no reason to leave a motion."""
         line = json.dumps({"at": time.strftime("%Y-%m-%dT%H:%M:%S%z"), "what": what} | facts)
-        with (self.folder / "diary.jsonl").open("a") as diary:
+        with contextlib.suppress(OSError), (self.folder / "diary.jsonl").open("a") as diary:
             diary.write(line + "\n")
 
     def keep_log(self, name: str, log: Array) -> Path:
@@ -172,13 +181,17 @@ class Calibration(msgspec.Struct, frozen=True, kw_only=True):
         spread_rad: Largest angle of a repeat from their mean [rad].
         repeats: How often it was shown.
         at: When.
+        tool: What hung on the flange; with another one the hand shows another pose.
+        seated_m: How deep the tip was taken to be [m].
     """
 
-    o_t_lock: tuple[float, ...]
+    o_t_lock: Annotated[tuple[float, ...], Meta(min_length=16, max_length=16)]
     spread_m: float
     spread_rad: float
     repeats: int
     at: str
+    tool: ToolTable
+    seated_m: float
 
     def pose(self) -> Array:
         """Return the lock's pose ``(4, 4)``."""

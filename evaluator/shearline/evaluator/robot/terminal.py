@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import getpass
 import sys
+import termios
 import threading
 import time
 from collections.abc import Callable
@@ -31,9 +32,10 @@ OTHERWISE = "type 'stop', 'pause', 'resume' or 'quit'"
 
 
 class Line(NamedTuple):
-    """A line that somebody typed."""
+    """A line that somebody typed, and when by this computer's monotonic clock [s]."""
 
     text: str
+    at_s: float
 
 
 class Closed(NamedTuple):
@@ -62,6 +64,11 @@ class Terminal:
         self._source = source or sys.stdin
         self._sink = sink or sys.stderr
 
+    def forget(self) -> None:
+        """Drop what was typed at a keyboard before anything was asked; a pipe is a script's."""
+        if self._source.isatty():
+            termios.tcflush(self._source, termios.TCIFLUSH)
+
     def start(self) -> None:
         """Begin to read."""
         threading.Thread(target=self._read, daemon=True, name="terminal").start()
@@ -79,13 +86,13 @@ class Terminal:
                 word = line.strip().lower()
                 if word == STOP:
                     self._stop()
-                self.inbox.put(Line(word))
+                self.inbox.put(Line(word, time.monotonic()))
         except (OSError, ValueError):
             pass
         self.inbox.put(Closed())
 
 
-def prompt(state: State, *, key_in_lock: bool) -> str:
+def prompt(state: State, *, key_in_lock: bool, rehearsed: bool) -> str:
     """Return what the operator may do where the arm stands."""
     first = ": it will first pull the key out of the lock" if key_in_lock else ""
     said = {
@@ -95,6 +102,8 @@ def prompt(state: State, *, key_in_lock: bool) -> str:
         State.JAMMED: "free the key by hand with the gripper closed, then type 'recover'",
         State.WORN: "replace what is worn and type 'replaced key' or 'replaced lock'",
     }
+    if state is State.READY and not rehearsed:
+        return f"{state}: type 'confirm' to rehearse, 'quit' to end"
     return f"{state}: {said.get(state, OTHERWISE)}"
 
 

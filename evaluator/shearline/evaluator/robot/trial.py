@@ -64,10 +64,10 @@ class Report:
 
     Attributes:
         end: Where the skill stands; its verdict is ``OPEN`` while there is none.
-        stretches: First and last time of each contact [s], robot's clock: where the log must be
-            complete.
+        stretches: First and last time at which each contact certainly ran [s], robot's clock:
+            where the log must be complete.
         notes: ``(t_s, phase, reference x, y, push, wiggle x, y, rx, ry)`` of every tick.
-        clipped: Share of the ticks that asked for more force than the clip lets through.
+        clipped: Share of the ticks that asked for more than clip and speeds let through.
         late: Ticks that were made up for because Python came late.
     """
 
@@ -76,6 +76,14 @@ class Report:
     notes: list[tuple[float, ...]] = field(default_factory=list)
     clipped: float = 0.0
     late: int = 0
+
+    def begun(self, t_s: float) -> None:
+        """Note that a contact runs, first seen now."""
+        self.stretches.append((t_s, t_s))
+
+    def ran_until(self, t_s: float) -> None:
+        """Note that the contact ran at least until now: it took a reference, or was ended."""
+        self.stretches[-1] = (self.stretches[-1][0], t_s)
 
 
 def must_be_free(watch: Watch, o_t_lock: Array) -> None:
@@ -98,22 +106,24 @@ def to_start(port: RobotPort, watch: Watch, work: Work) -> None:
     Raises:
         MotionEnded: If it does not get there; with ``INVALID`` if the robot believes that it is
             elsewhere, or something touches the tool.
+        RobotRefused: If the port does not take the lab's guard, or does not tare.
     """
     start, bounds = work.start_pose(), work.bounds.start
-    port.move_free(start, bounds.speed_mps * work.pace)
-    watch.refresh()
+    with watch.blocked():
+        port.move_free(start, bounds.speed_mps * work.pace)
     off_m, off_rad = apart(start, watch.look().o_t_ee)
     if off_m > bounds.tolerance_m or off_rad > bounds.tolerance_rad:
         raise MotionEnded(
             Ending.INVALID,
             f"the arm is {off_m * 1e3:.1f} mm and {np.degrees(off_rad):.1f} deg off the start pose",
         )
-    port.set_guard(work.bounds.port_guard())
-    watch.refresh()
     view = Sight(work.o_t_lock).view(watch.look())
     lateral_m = float(np.hypot(view.tip[0], view.tip[1]))
+    # By the tare before: a new one makes zero of whatever touches the tool.
     if not semantic.may_start(float(view.tip[2]), lateral_m, view.tau_ext, work.limits):
         raise MotionEnded(Ending.INVALID, "something touches the tool at the start pose: free it")
+    with watch.blocked():
+        port.set_guard(work.bounds.port_guard())
 
 
 class Insertion:
@@ -146,8 +156,8 @@ class Insertion:
         for tick in range(ticks + 1):
             command(c, semantic.APPROACH, tick, view.tip, 0.0, work.p, work.tick_s)
         goal = in_lock(work.o_t_lock, c.x, c.turn.tolist())
-        self._port.move_free(goal, work.bounds.start.speed_mps * work.pace)
-        self._watch.refresh()
+        with self._watch.blocked():
+            self._port.move_free(goal, work.bounds.start.speed_mps * work.pace)
         settled = round((APPROACH_S + semantic.SETTLE_S) / work.tick_s)
         self._report.end = Decision(semantic.APPROACH, settled, 0, -1, semantic.OPEN, 0.0)
 
@@ -172,29 +182,31 @@ class Insertion:
         """Run one contact: as long as the stiffness that the skill asks for stays the same."""
         c, work, report = self._command, self._work, self._report
         stiffness, before_s = stiffness_of(c), view.t_s
-        seen: list[float] = []
-        session = self._port.contact(contact_of(c, work.o_t_lock, work.bounds, t_max_s))
-        self._watch.refresh()
+        with self._watch.blocked():
+            session = self._port.contact(contact_of(c, work.o_t_lock, work.bounds, t_max_s))
         view = self._sight.view(self._watch.look())
+        report.begun(view.t_s)
         self._reference.begin(view.tip, view.turn)
         self._step(view, self._ticks(view.t_s - before_s))
         try:
             while report.end.verdict == semantic.OPEN and _same(stiffness_of(c), stiffness):
                 view = self._tick(session, view)
-                seen += [view.t_s] if view.moving else []
-            session.end()
+            with self._watch.blocked():
+                session.end()
+            report.ran_until(view.t_s)
         except MotionEnded as ended:
             self._judge(ended, view)
         finally:
-            report.stretches += [(seen[0], seen[-1])] if seen else []
-            _let_go(session)
+            with self._watch.blocked():
+                _let_go(session)
         return view
 
     def _tick(self, session: ContactSession, view: View) -> View:
         work = self._work
         target = target_of(self._command, view.speed_z)
-        self._reference.toward(target, view.tip, work.tick_s)
+        self._reference.toward(target, view.tip, view.turn, work.tick_s)
         session.ref(self._reference.pose(work.o_t_lock))
+        self._report.ran_until(view.t_s)
         after = self._sight.view(self._watch.until(view.t_s + work.tick_s))
         ticks = self._ticks(after.t_s - view.t_s)
         if ticks * work.tick_s > LATE_S_MAX:

@@ -7,8 +7,9 @@ It sends nothing to the robot.
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -39,6 +40,7 @@ class Watch:
         port: Open.
         halt: Called at every look; raises :class:`Halted` if the motion is to end.
         wall_s: A clock of this computer [s].
+        on_block: Called before every call of the port that may last.
     """
 
     def __init__(
@@ -46,10 +48,12 @@ class Watch:
         port: RobotPort,
         halt: Callable[[], None] = lambda: None,
         wall_s: Callable[[], float] = time.monotonic,
+        on_block: Callable[[], None] = lambda: None,
     ) -> None:
         self._port = port
         self._halt = halt
         self._wall_s = wall_s
+        self._on_block = on_block
         self._t_s = -np.inf
         self._fresh_s = wall_s()
         self._zeros = 0
@@ -81,6 +85,15 @@ class Watch:
                 return sample
             if sample.t_s == before_s:
                 time.sleep(NAP_S)
+
+    @contextlib.contextmanager
+    def blocked(self) -> Iterator[None]:
+        """Around a call of the port that may last: nobody looks meanwhile, and all is well."""
+        self._on_block()
+        try:
+            yield
+        finally:
+            self.refresh()
 
     def refresh(self) -> None:
         """Forget how long ago the clock moved: nobody looked meanwhile."""
