@@ -50,14 +50,14 @@ def test_a_rehearsal_that_was_halted_lets_no_trial_in_until_one_succeeds(rig: Ma
 
     def halt(_stage: Any, what: str) -> None:
         if what == "ref":
-            arm.arm.peer.halt_why = "the run was stopped"
+            arm.arm.peer.leaving = "the worker leaves"
 
     spy.interfere = halt
     arm.type("confirm")
     assert (arm.state, arm.takes()) == (State.READY, False)
     assert "type 'confirm' to rehearse" in arm.printed
     spy.interfere = lambda *_: None
-    arm.arm.peer.halt_why = ""
+    arm.arm.peer.leaving = ""
     spy.moves.clear()
     assert arm.run(attempt()).result.kind is OutcomeKind.ABORTED
     assert spy.moves == []
