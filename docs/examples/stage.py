@@ -7,7 +7,16 @@ import numpy as np
 
 from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotRefused
 from shearline.evaluator.robot.frames import pose
-from shearline.evaluator.robot.port import Consent, Contact, Guard, Mode, Sample, Tool, log_row
+from shearline.evaluator.robot.port import (
+    TARE_SHARE,
+    Consent,
+    Contact,
+    Guard,
+    Mode,
+    Sample,
+    Tool,
+    log_row,
+)
 
 DOWN, MOUTH, HOLE = np.diag([1.0, -1.0, -1.0]), np.array([0.3, 0.0, 0.1]), (0.2e-3, -0.1e-3)
 DEPTH, CLEARANCE, WALL, MASS, TICK = 0.025, 0.4e-3, 5e4, 5.0, 1e-3
@@ -18,6 +27,7 @@ class Slide:
 
     def __init__(self, height_m: float) -> None:
         self.x, self.v, self.force = MOUTH - DOWN[2] * height_m, np.zeros(3), np.zeros(3)
+        self.zero, self.rng = np.zeros(3), np.random.default_rng(0)
 
     def step(self, c: Contact | None, goal: np.ndarray) -> None:
         """Move on by one tick of impedance control, or stand still."""
@@ -28,6 +38,17 @@ class Slide:
             self.v = self.v + TICK / MASS * (c.o_r_c @ (pull - brake) + self.force)
             self.x = self.x + TICK * self.v
         self.force = DOWN @ self.resistance(DOWN @ (self.x - MOUTH), DOWN @ self.v)
+
+    def feel(self) -> np.ndarray:
+        """Return what the sensor reads, not tared."""
+        return self.force + self.rng.normal(0.0, 0.01, 3)
+
+    def resting(self, guard: Guard) -> np.ndarray:
+        """Return what a tare would take for nothing, unless it is too much to be that."""
+        felt = self.feel()
+        if np.linalg.norm(felt) > TARE_SHARE * guard.force_max_n:
+            raise RobotRefused(f"{felt.round(1)} N on the peg: free it before it is tared")
+        return felt
 
     def resistance(self, at: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Return the force on the peg in the frame of the mouth: face, wall, friction, bottom."""
@@ -46,24 +67,24 @@ class Stage:
 
     def __init__(self, hand: str = "") -> None:
         self.hand, self.slide = hand, Slide(-DEPTH if hand else 0.02)
-        self.guard = self.task = self.goal = None
         self.latch = RobotRefused("no guard is set: set_guard() comes first")
-        self.t_s, self.rows, self.rng = 0.0, [], np.random.default_rng(0)
+        self.t_s, self.rows, self.guard, self.task, self.goal = 0.0, [], None, None, None
 
     def open(self, tool: Tool) -> None: ...
     def close(self) -> None: ...
-    def set_guard(self, guard: Guard) -> None:
+    def set_guard(self, guard: Guard, *, tare: bool = True) -> None:
+        self.slide.zero = self.slide.resting(guard) if tare else self.slide.zero
         self.latch, self.guard = self.latch if self.guard else None, guard
 
     def sample(self) -> Sample:
         self.t_s += TICK
         self.slide.step(self.task, self.goal)
+        felt, x = self.slide.feel() - self.slide.zero, self.slide.x
         if self.task and self.t_s >= self.until:
             self._end(Ending.TIME, "the contact's time is up")
-        elif self.task and np.linalg.norm(self.slide.force) > self.guard.force_max_n:
+        elif self.task and np.linalg.norm(felt) > self.guard.force_max_n:
             self._end(Ending.GUARD, "the force is above the guard's")
-        felt, x = self.slide.force + self.rng.normal(0.0, 0.01, 3), self.slide.x
-        at = pose(x + self.rng.normal(0.0, 2e-5, 3) if self.hand else x, DOWN)
+        at = pose(x + self.slide.rng.normal(0.0, 2e-5, 3) if self.hand else x, DOWN)
         mode, wrench = Mode.MOVE if self.task else Mode.IDLE, np.append(felt, [0.0] * 3)
         now = Sample(self.t_s, x, self.slide.v, -felt, felt, at, wrench, mode)
         self.rows.append(log_row(now))

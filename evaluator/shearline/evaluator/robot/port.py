@@ -33,6 +33,9 @@ LOG_STEP_S = 1e-3
 #: A port ends a contact at most this long after ``Contact.t_max_s`` [s], Python running or not.
 T_MAX_GRACE_S = 0.01
 
+#: No tare hides more than this share of the guard: what is felt beyond it is a touch, no drift.
+TARE_SHARE = 0.25
+
 
 class Mode(enum.StrEnum):
     """What the robot's own controller says that it is doing."""
@@ -205,13 +208,21 @@ class RobotPort(Protocol):
         """
         ...
 
-    def set_guard(self, guard: Guard) -> None:
+    def set_guard(self, guard: Guard, *, tare: bool = True) -> None:
         """Keep to ``guard`` from now on, and tare ``tau_ext`` and ``o_f_ext`` here and now.
 
-        Only while the arm stands and touches nothing. No motion is possible before the first call.
+        Only while the arm stands, and to tare only while it touches nothing. No motion is possible
+        before the first call.
+
+        Args:
+            guard: The limits.
+            tare: Whether what is felt now is zero from now on; otherwise the last tare stays, and
+                before the first one the robot's own zero.
 
         Raises:
-            RobotRefused: If the arm moves, or the robot does not take these limits.
+            RobotRefused: If the arm moves, the robot does not take these limits, or a tare would
+                be more than :data:`TARE_SHARE` of the guard on any joint, or in force or torque of
+                the tip; guard and tare are then as before.
         """
         ...
 

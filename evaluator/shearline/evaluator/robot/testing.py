@@ -22,11 +22,12 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotError
+from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotError, RobotRefused
 from shearline.evaluator.robot.frames import apart, is_pose
 from shearline.evaluator.robot.log import missing
 from shearline.evaluator.robot.port import (
@@ -125,6 +126,18 @@ class RobotPortContract(ABC):
                 port.contact(self.contact(sample))
         finally:
             port.close()
+
+    def test_a_tare_that_would_hide_a_touch_is_refused(self, port: RobotPort) -> None:
+        """No sensor is so quiet: what it feels now is above a quarter of such a guard."""
+        numb = replace(self.guard(port), force_max_n=1e-9)
+        with pytest.raises(RobotRefused):
+            port.set_guard(numb)
+        port.contact(self.contact(port.sample())).end()  # under the guard it had
+
+    def test_limits_can_be_set_without_a_tare(self, port: RobotPort) -> None:
+        """As with a key in the lock, whose pull is no zero."""
+        port.set_guard(self.guard(port), tare=False)
+        port.contact(self.contact(port.sample())).end()
 
     # -- samples ---------------------------------------------------------------------------------
 
