@@ -148,7 +148,7 @@ class Arm(Mover):
         if why := worn(self._store.wear(), self._bounds.wear):
             self._enter(Cause.WEAR, why)
             return
-        self.peer.halt_why = ""
+        self.alive(PATIENCE_S)  # tares, and may compile the skill
         self._watch.refresh()
         try:
             self._must_stand()
@@ -196,7 +196,9 @@ class Arm(Mover):
         token = asked.trial.token
         if token not in self._answers:
             began_s = time.monotonic()
+            self.peer.running = token
             ran = self._attempt(asked)
+            self.peer.running = ""
             result, trace = result_of(
                 asked.trial, replace(ran, wall_s=time.monotonic() - began_s), self._cell()
             )
