@@ -25,6 +25,7 @@ from shearline.evaluator.mail import (
     Abort,
     Beat,
     Ended,
+    Event,
     Gate,
     Heard,
     Instruction,
@@ -373,6 +374,41 @@ def test_what_earlier_lives_owed_is_sent_under_this_boot_until_it_is_acknowledge
     assert len(said(box.handle(Tick(), 1.0), Result)) == 1
     assert of(box.handle(ack(7), 1.1), Settled) == [Settled(token(7))]
     assert said(box.handle(Tick(), 9.0), Result) == []
+
+
+def test_a_result_that_the_learner_does_not_know_is_not_settled() -> None:
+    box = mailbox()
+    box.keeps = True
+    box.owe([result(7)])
+    box.handle(LearnerAlive(1), 0.0)
+    box.handle(welcome(), 0.1)
+    unknown = Heard(Ack(boot=BOOT, token=token(7), verdict=Verdict.UNKNOWN))
+    assert of(box.handle(unknown, 0.2), Settled) == []
+    assert said(box.handle(Tick(), 9.0), Result) == [], "this life does not ask again"
+
+
+@pytest.mark.parametrize("ends", [STOP, Leave(130, "interrupted")])
+def test_what_needs_long_to_end_in_order_is_waited_for(ends: Event) -> None:
+    box = joined()
+    box.farewell_s = 60.0
+    box.handle(Heard(trial(1)), 0.0)
+    box.handle(Started(token(1)), 0.0)
+    box.handle(ends, 1.0)
+    done = drive(box, 55.0, 1.0)
+    assert not any(isinstance(i, Quit) for _, i in done)
+    assert said(box.handle(Ended(result(1)), 55.0), Result)
+    done = drive(box, 80.0, 55.0)
+    assert done[-1][0] == pytest.approx(55.0 + LEAVE_S, abs=1e-3), "acks: not so long"
+
+
+def test_a_trial_past_its_deadline_counts_as_hung_only_after_its_farewell() -> None:
+    box = joined()
+    box.farewell_s = 60.0
+    box.handle(Heard(trial(1)), 0.0)
+    box.handle(Started(token(1)), 0.0)
+    done = drive(box, 200.0)
+    (quit_s,) = [now_s for now_s, i in done if isinstance(i, Quit)]
+    assert quit_s >= 10.0 + 60.0 + HANG_S
 
 
 def test_nobody_hears_what_is_settled_where_nobody_keeps_results() -> None:

@@ -131,8 +131,14 @@ class Attended(Protocol):
         """Results of this hardware that may still be owed, also of earlier processes."""
         ...
 
+    @property
+    def farewell_s(self) -> float:
+        """How long a trial may take to end in order once ``beat`` has raised [s]."""
+        ...
+
     def join(
         self,
+        name: str,
         ready: Callable[[bool], None],
         over: Callable[[int, str], None],
         look: Callable[[], tuple[bool, bool]],
@@ -140,10 +146,14 @@ class Attended(Protocol):
         """Be given a worker, before anything else.
 
         Args:
+            name: The evaluator's; results are owed under it.
             ready: To be called, from any thread, when trials may come or may not any more.
             over: To be called, from any thread, with an exit code and a sentence when nothing
                 more will come of this hardware in this process.
             look: Tells whether the learner can be reached, and whether the run is held.
+
+        Raises:
+            ConfigError: If results are owed under another name.
         """
         ...
 
@@ -152,5 +162,5 @@ class Attended(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of the hardware in good order."""
+        """Let go of the hardware in good order, and wait until it is let go of."""
         ...

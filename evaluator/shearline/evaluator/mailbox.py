@@ -46,6 +46,7 @@ from shearline.protocol.messages import (
     Renew,
     Result,
     Trial,
+    Verdict,
     Welcome,
     clip,
 )
@@ -119,12 +120,14 @@ class Mailbox:
         pulses: The task cannot beat (it is one call of the user's function), so leases are
             renewed for it while it runs, up to its deadline and no longer.
         keeps: Somebody keeps results until they are acknowledged, and wants to hear when.
+        farewell_s: How long what runs may take to end in order once it was asked to [s].
     """
 
     hello: Hello
     takes_task: bool = False
     pulses: bool = False
     keeps: bool = False
+    farewell_s: float = 0.0
     lease_s: float = 2.0
     epoch: int | None = None
     welcomed: bool = False
@@ -235,8 +238,8 @@ class Mailbox:
                 self._welcome(message, now_s)
             case Refused(why=why, ended=ended):
                 self._leave(0 if ended else 4, why, now_s, finish=False)
-            case Ack(token=token):
-                self._acked(token)
+            case Ack(token=token, verdict=verdict):
+                self._acked(token, verdict)
             case Command(kind=CommandKind.STOP, why=why):
                 self._leave(0, why or "the run has ended", now_s, finish=True)
             case Command(kind=kind):
@@ -285,10 +288,10 @@ class Mailbox:
     def _has_room(self) -> bool:
         return self.warm and self.leaving is None and len(self.held) < HELD_MAX
 
-    def _acked(self, token: str) -> None:
+    def _acked(self, token: str, verdict: Verdict = Verdict.COUNTED) -> None:
         unacked = self.unacked.pop(token, None)
         if unacked is not None:
-            if self.keeps:
+            if self.keeps and verdict is not Verdict.UNKNOWN:  # who does not know it has no say
                 self._out.append(Settled(token))
             self.answered[token] = unacked.result
             while len(self.answered) > ANSWERED_MAX:
@@ -310,7 +313,7 @@ class Mailbox:
     def _started(self, token: str, now_s: float) -> None:
         trial = self.held.get(token)
         if trial is not None:
-            grace_s = 0.0 if self.pulses else HANG_S
+            grace_s = 0.0 if self.pulses else HANG_S + self.farewell_s
             self.running = _Running(token, now_s + trial.deadline_s + grace_s)
             if self.pulses:
                 self._life_s = min(self._life_s, now_s + RENEW_LEASES * self.lease_s)
@@ -323,6 +326,9 @@ class Mailbox:
             if self.welcomed:
                 self._life_s = min(self._life_s, now_s + IDLE_LEASES * self.lease_s)
         self.unacked[result.token] = _Unacked(result, now_s)
+        if self.leaving is not None and not self.held:  # only an acknowledgement is waited for
+            until_s = max(now_s, self.leaving.abort_s) + LEAVE_S
+            self.leaving.until_s = min(self.leaving.until_s, until_s)
 
     # -- time -----------------------------------------------------------------------------------
 
@@ -391,12 +397,12 @@ class Mailbox:
     def _leave(self, code: int, why: str, now_s: float, *, finish: bool) -> None:
         if self.leaving is None:
             abort_s = now_s + FINISH_S if finish and self.running is not None else now_s
-            self.leaving = _Leaving(code, why, abort_s, abort_s + LEAVE_S)
+            self.leaving = _Leaving(code, why, abort_s, abort_s + LEAVE_S + self.farewell_s)
 
     def _go(self, leaving: _Leaving, now_s: float) -> None:
         if now_s >= leaving.abort_s and not leaving.aborted:
             leaving.aborted = True
-            leaving.until_s = now_s + LEAVE_S
+            leaving.until_s = now_s + LEAVE_S + (self.farewell_s if self.held else 0.0)
             self._out.append(Abort(leaving.why))
         # A function cannot be aborted, so nobody waits for it; what is held goes back with a bye.
         idle = not self.held or (leaving.aborted and self.pulses)

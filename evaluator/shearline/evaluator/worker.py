@@ -2,12 +2,14 @@
 
 Trials run on the main thread, so that signals reach it and simulators that insist on the main
 thread get it. The worker never forks and never waits for ever: whoever asked it to leave sees it
-gone within a few seconds, if need be by ``os._exit``. It does not know how trials are chosen.
+gone within a few seconds, if need be by ``os._exit``, or as soon as hardware is let go of in good
+order. It does not know how trials are chosen.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import logging
 import os
 import platform
@@ -40,7 +42,7 @@ from shearline.protocol.task import TaskSpec, digest
 
 log = logging.getLogger(__name__)
 
-#: How long the trial's thread may take to hear that it is over [s].
+#: How long the trial's thread may take to hear that it is over, unless a task says more [s].
 FAREWELL_S = 0.3
 
 #: Trials that follow each other faster than this share one line of the log [s].
@@ -58,11 +60,14 @@ def default_name(bounds: str | None = None) -> str:
     """Return a name that no other evaluator has: this machine's and this process's.
 
     A robot's is the same in every process, for its results may outlive one: it ends in the name of
-    its bounds file.
+    its bounds file and six digits that stand for where that is.
     """
     host = _plain(platform.node().split(".")[0]) or "host"
-    own = str(os.getpid()) if bounds is None else _plain(Path(bounds).stem)[:12] or "robot"
-    return f"{host[:48]}-{own}"
+    if bounds is None:
+        return f"{host[:48]}-{os.getpid()}"
+    path = Path(bounds).resolve()
+    place = hashlib.sha256(str(path).encode()).hexdigest()[:6]
+    return f"{host[:40]}-{_plain(path.stem)[:12] or 'robot'}-{place}"
 
 
 def _plain(text: str) -> str:
@@ -116,7 +121,8 @@ def run_worker(
         and one sentence. The caller should end the process with ``os._exit``.
 
     Raises:
-        ConfigError: If the evaluator's name cannot stand in a key.
+        ConfigError: If the evaluator's name cannot stand in a key, or is not the one under which a
+            robot's results are owed.
     """
     return Worker(config, task, hard_exit).run()
 
@@ -150,7 +156,8 @@ class Worker:
     def run(self) -> End:
         """Run trials until the end."""
         if self._attended is not None:
-            self._attended.join(self._be_ready, self.exchange.leave, self._look)
+            name = self._config.name
+            self._attended.join(name, self._be_ready, self.exchange.leave, self._look)
             self.exchange.settled = self._attended.spool.drop
         network = threading.Thread(target=self._network, daemon=True, name="postman")
         with _signals(self.exchange), quick_switching():
@@ -167,6 +174,8 @@ class Worker:
                     case End():
                         self._parted.set()
                         network.join(FAREWELL_S)
+                        if self._attended is not None:
+                            self._attended.close()
                         return job
 
     # -- the trial's thread ------------------------------------------------------------------
@@ -311,8 +320,11 @@ class Worker:
         if leaving is not None:
             end = End(leaving.code, leaving.why)
         self.exchange.finish(end)
-        if not self._parted.wait(FAREWELL_S):
+        attended = self._attended
+        if not self._parted.wait(FAREWELL_S if attended is None else attended.farewell_s):
             log.warning("%s; the trial does not come back, so the process ends", end.why)
+            if attended is not None:
+                attended.close()
             self._hard_exit(end.code)
 
     def _serve(self) -> End:
@@ -351,6 +363,7 @@ class Worker:
         keeps = attended is not None
         mailbox = Mailbox(hello, takes_task=own is None, pulses=function, keeps=keeps, warm=warm)
         if attended is not None:
+            mailbox.farewell_s = attended.farewell_s
             mailbox.owe(attended.spool.pending(run))
         return mailbox
 

@@ -111,7 +111,7 @@ class Cell:
     def __enter__(self) -> Self:
         reads, self._types = os.pipe()
         self.task = RobotTask(self.orders(), reads)
-        self.task.join(self._ready, lambda *over: self.said.append(over), self._look)
+        self.task.join("lab-1", self._ready, lambda *over: self.said.append(over), self._look)
         try:
             self.task.warm()
         finally:
@@ -194,6 +194,7 @@ class Running:
     def __init__(self, cell: Cell, asked: Any) -> None:
         self.ended: Outcome | TrialAborted | None = None
         self._cell, self._asked = cell, asked
+        self._stop_why = ""
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
@@ -201,9 +202,17 @@ class Running:
         task = self._cell.task
         task.announce(self._asked.run, self._asked.trial)
         try:
-            self.ended = task.run(np.array(self._asked.trial.theta), 0, lambda: None)
+            self.ended = task.run(np.array(self._asked.trial.theta), 0, self._beat)
         except TrialAborted as aborted:
             self.ended = aborted
+
+    def _beat(self) -> None:
+        if self._stop_why:
+            raise TrialAborted(self._stop_why)
+
+    def stop(self, why: str) -> None:
+        """Have the worker's next beat end it."""
+        self._stop_why = why
 
     def outcome(self) -> Outcome:
         """Return the verdict."""

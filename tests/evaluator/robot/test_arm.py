@@ -165,13 +165,14 @@ def test_a_hold_pauses_the_arm_and_a_resume_ends_that(rig: Make) -> None:
 def test_a_wish_to_stop_ends_the_trial_and_brings_the_key_out(rig: Make) -> None:
     spy = Spy()
     arm = rig(spy).armed()
+    asked = attempt()
 
     def wish(_stage: Any, what: str) -> None:
         if what == "ref":
-            arm.arm.peer.halt_why = "the run was stopped"
+            arm.arm.peer.halts[asked.trial.token] = "the run was stopped"
 
     spy.interfere = wish
-    answer = arm.run(attempt())
+    answer = arm.run(asked)
     assert (answer.result.kind, answer.result.why) == (OutcomeKind.ABORTED, "the run was stopped")
     assert arm.state is State.READY
     assert not arm.store.key_in_lock
@@ -210,4 +211,4 @@ def test_no_message_of_the_pipe_arms_recovers_or_widens_anything() -> None:
     names = {kind.__name__ for kind in pipe.ToArm.__args__}
     assert names == {"Try", "Stop", "Look", "Leave"}
     fields = {f for kind in pipe.ToArm.__args__ for f in kind.__struct_fields__}
-    assert fields == {"run", "trial", "why", "linked", "held"}
+    assert fields == {"run", "trial", "token", "why", "linked", "held"}

@@ -19,8 +19,8 @@ from emulator.kit import Kind, kinds
 from emulator.process import Emulator
 from evaluator.robot.cell import Cell
 
-from shearline.evaluator.robot.bounds import FORCE_MAX_N
 from shearline.evaluator.robot.port import log_columns
+from shearline.evaluator.skill.manipulation import AXIAL_K
 from shearline.protocol.messages import OutcomeKind
 
 pytestmark = [pytest.mark.slow, pytest.mark.chaos]
@@ -83,16 +83,19 @@ def test_what_the_bounds_do_not_allow_is_rejected_and_nothing_moves(cell: Make) 
 def test_the_arm_pushes_no_harder_than_stiffness_times_clip_whatever_the_skill_asks(
     cell: Make,
 ) -> None:
-    """Over a twentieth of a second: an impact is no matter of stiffness."""
-    with cell() as armed:
+    """In all but a twentieth of the time: an impact, as at the lock's bottom, is no matter of it.
+
+    The push that is asked for is more than twice what the clip lets through.
+    """
+    clip_m = 0.005
+    with cell(lab=f"[contact]\nclip_m = {clip_m}\n") as armed:
         armed.armed()
-        pushing = armed.theta(ins_push=20.0, con_speed=0.1, con_force=1.0, **{**LONG, "xi": 0.3})
+        pushing = armed.theta(ins_push=20.0, con_speed=0.02, con_force=1.0, **{**LONG, "xi": 0.3})
         trace = armed.start(theta=pushing).outcome().trace
         assert trace is not None
-        force = np.stack([trace.columns[f"wrench.{axis}"][1] for axis in ("fx", "fy", "fz")])
-        window = np.ones(50) / 50
-        mean = np.stack([np.convolve(row, window, mode="valid") for row in force])
-        assert np.linalg.norm(mean, axis=0).max() <= 1.1 * FORCE_MAX_N
+        mean = np.convolve(trace.columns["wrench.fz"][1], np.ones(50) / 50, mode="valid")
+        most_n = np.quantile(np.abs(mean), 0.95)
+        assert 0.9 * AXIAL_K * clip_m < most_n <= 1.1 * AXIAL_K * clip_m
 
 
 FAULTS: dict[str, Callable[[Cell, Emulator], object]] = {

@@ -27,6 +27,7 @@ from shearline.evaluator.robot.port import Mode
 from shearline.evaluator.robot.process import Orders, listen, main, run
 from shearline.evaluator.robot.results import Task
 from shearline.evaluator.robot.store import Store
+from shearline.evaluator.robot.task import RobotTask
 from shearline.evaluator.robot.terminal import Closed, Terminal
 from shearline.protocol.errors import ConfigError
 
@@ -66,6 +67,14 @@ def test_a_bad_bounds_file_is_refused(tmp_path: Path) -> None:
     over = run(asked)
     assert over.code == 2
     assert "missing required field" in over.why
+
+
+def test_a_bounds_file_that_is_not_there_is_refused_and_nothing_is_made(tmp_path: Path) -> None:
+    missing = tmp_path / "labs" / "typo.toml"
+    missing.parent.mkdir()
+    with pytest.raises(ConfigError, match="cannot be read"):
+        RobotTask(orders(tmp_path, bounds=str(missing)))
+    assert list(missing.parent.iterdir()) == []
 
 
 def test_no_calibration_is_refused(tmp_path: Path) -> None:
@@ -260,18 +269,32 @@ def test_what_the_worker_says_is_noted_at_once_or_waits_its_turn() -> None:
     inbox, peer = SimpleQueue[Any](), Peer()
     for message in (
         pipe.Look(linked=False, held=True),
-        pipe.Stop(why="stop the one before"),
         attempt(3),
-        pipe.Stop(why="stop it"),
         pipe.Leave(why="bye"),
     ):
         theirs.send(message)
     theirs.close()
     listen(ours, inbox, peer)
-    assert (peer.linked, peer.held, peer.halt_why, peer.leaving) == (False, True, "stop it", "bye")
+    assert (peer.linked, peer.held, peer.halt_why, peer.leaving) == (False, True, "", "bye")
     items = [inbox.get_nowait() for _ in range(3)]
     assert items[:2] == [attempt(3), pipe.Leave(why="bye")]
     assert isinstance(items[2], Gone)
+    ours.close()
+
+
+def test_a_stop_is_for_one_attempt_and_no_other_revokes_it() -> None:
+    ours, theirs = pipes()
+    peer = Peer()
+    before, other = attempt(3), attempt(4)
+    theirs.send(before)
+    theirs.send(pipe.Stop(token=before.trial.token, why="stop it"))
+    theirs.send(other)
+    theirs.close()
+    listen(ours, SimpleQueue[Any](), peer)
+    peer.running = before.trial.token
+    assert peer.halt_why == "stop it"
+    peer.running = other.trial.token
+    assert peer.halt_why == ""
     ours.close()
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from evaluator.robot.cell import Cell
+from evaluator.robot.rig import attempt
 from evaluator.tiny_learner import TinyLearner, working
 
 from shearline.evaluator.base import Attended
@@ -64,6 +65,58 @@ def test_an_arms_process_that_dies_or_freezes_is_noticed_and_ended(
         assert cell.start(1).aborted()
 
 
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGSTOP])
+def test_an_arms_process_that_dies_or_freezes_between_trials_is_noticed_too(
+    cell: Cell, sent: signal.Signals
+) -> None:
+    with cell:
+        cell.armed()
+        cell.process.send_signal(sent)
+        assert cell.process.wait(10.0) == -signal.SIGKILL
+        cell.until(lambda: cell.said, "the end")
+        assert [code for code, _ in cell.said] == [4]
+        assert not cell.ready.is_set()
+
+
+def test_a_trial_that_is_stopped_ends_in_order_however_long_that_takes(cell: Cell) -> None:
+    with cell:
+        cell.armed()
+        running = cell.start(theta=cell.theta(con_speed=0.005, ins_push=0.0, con_force=1.0))
+        cell.until(cell.in_contact, "contact")
+        running.stop("the worker leaves")
+        assert "the worker leaves" in running.aborted()
+        assert not cell.in_contact()
+        assert cell.process.poll() is None
+        (kept,) = cell.spooled()
+        assert kept.kind is OutcomeKind.ABORTED
+
+
+def test_closing_waits_until_the_key_is_out_and_the_process_has_ended(cell: Cell) -> None:
+    with cell:
+        cell.armed()
+        cell.start(theta=cell.theta(con_speed=0.005))
+        cell.until(cell.in_contact, "contact")
+        cell.task.close()
+        assert cell.process.poll() == 0
+        assert not cell.in_contact()
+
+
+def test_what_was_measured_is_found_though_nobody_was_left_to_say_it(cell: Cell) -> None:
+    with cell:
+        asked = attempt(theta=cell.theta())
+        measured = Result(
+            boot=asked.trial.boot,
+            token=asked.trial.token,
+            trial=asked.trial.trial,
+            kind=OutcomeKind.SUCCESS,
+            cost=2.5,
+            seed=0,
+        )
+        cell.process.send_signal(signal.SIGSTOP)
+        cell.task.spool.put(asked.run, measured)  # as the arm does just before it dies
+        assert cell.start(theta=cell.theta()).outcome().cost == measured.cost
+
+
 def test_a_robot_that_is_refused_ends_before_it_begins(cell: Cell) -> None:
     (cell.state / "calibration.json").unlink()
     with pytest.raises(RobotDown, match="--calibrate"), cell:
@@ -110,6 +163,29 @@ def test_a_worker_has_no_credit_before_the_operator_confirmed_and_one_after(
         learner.next(Bye)
     task.close()
     assert task.spool.pending("run-1") == []
+
+
+def test_when_the_run_ends_in_a_trial_the_worker_stays_until_the_arms_process_has_ended(
+    cell: Cell, learner: TinyLearner
+) -> None:
+    learner.spec = keylock_spec()
+    task, types = attended(cell)
+    with working(learner.endpoint, task) as worker:
+        hello = learner.welcome()
+        types("confirm")
+        while learner.next(Credit).credits == 0:
+            pass
+        endless = cell.theta(con_speed=0.005, ins_push=0.0, con_force=1.0)
+        learner.give(hello, 1, endless, deadline_s=60.0)
+        cell.until(cell.in_contact, "contact")
+        learner.stop()
+        assert learner.take(Verdict.NOTED).token == "token-000001"
+        learner.next(Bye)
+        assert worker.end().code == 0
+        assert task._process is not None
+        assert task._process.poll() == 0
+        assert worker.exits.empty()
+        assert not cell.in_contact()
 
 
 def test_what_was_owed_by_an_earlier_process_is_delivered_once(

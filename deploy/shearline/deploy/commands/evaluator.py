@@ -91,7 +91,6 @@ def _work(arguments: argparse.Namespace, task: Task | None) -> int:
     """Run the worker, and end this process."""
     import logging  # noqa: PLC0415 - with what logs
 
-    from shearline.evaluator.base import Attended  # noqa: PLC0415
     from shearline.evaluator.worker import (  # noqa: PLC0415 - loads zenoh
         WorkerConfig,
         default_name,
@@ -110,8 +109,6 @@ def _work(arguments: argparse.Namespace, task: Task | None) -> int:
         trace_hz=arguments.trace_hz,
     )
     end = run_worker(config, task)
-    if isinstance(task, Attended):
-        task.close()
     print(f"shearline: {end.why}", file=sys.stderr, flush=True)
     # A session that will not close, or a trial that will not return, must not keep us here.
     os._exit(end.code)

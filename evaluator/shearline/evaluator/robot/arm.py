@@ -164,7 +164,7 @@ class Arm(Mover):
         if why := worn(self._store.wear(), self._bounds.wear):
             self._enter(Cause.WEAR, why)
             return
-        self.peer.halt_why = ""
+        self.alive(PATIENCE_S)  # tares, and may compile the skill
         self._watch.refresh()
         self._must_stand()
         try:
@@ -232,14 +232,14 @@ class Arm(Mover):
 
     def _served(self, asked: pipe.Try) -> Ran:
         """Run an attempt for the learner; whatever goes wrong, it has an answer."""
-        self._serving = True
+        self.peer.running = asked.trial.token
         try:
             return self._attempt(asked)
         except FAULTS as fault:
             self._break(fault)
             return Ran(OutcomeKind.ABORTED, str(fault))
         finally:
-            self._serving = False
+            self.peer.running = ""
 
     def _attempt(self, asked: pipe.Try) -> Ran:
         theta = np.array(asked.trial.theta)

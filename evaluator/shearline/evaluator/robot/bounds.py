@@ -24,8 +24,9 @@ from shearline.evaluator.robot.errors import BoundsError
 from shearline.evaluator.robot.port import Array, Guard, Tool
 from shearline.evaluator.skill.parameters import BOUNDS
 
-#: No file allows more. The speed is that of manual operation in ISO 10218-1 (reduced speed); the
-#: force leaves a factor of three to the 140 N that ISO/TS 15066 gives for a hand.
+#: No file allows more. The speed is that of manual operation in ISO 10218-1 (reduced speed). The
+#: force is along each axis of the lock; with all three at once, 69 N, it is half of the 140 N that
+#: ISO/TS 15066 gives for a hand.
 SPEED_MAX_MPS = 0.25
 FORCE_MAX_N = 40.0
 TORQUE_MAX_NM = 12.0
@@ -51,7 +52,10 @@ class ToolTable(_Table, frozen=True, kw_only=True):
 
 
 class ContactTable(_Table, frozen=True, kw_only=True):
-    """How hard and how fast the arm may push: stiffness, clip, force, references, time."""
+    """How hard and how fast the arm may push: stiffness, clip, force, references, time.
+
+    Force and torque are those along, and about, each axis of the lock.
+    """
 
     stiffness_max_npm: Positive = 2000.0
     stiffness_max_nmprad: Positive = 200.0
@@ -164,6 +168,8 @@ class Bounds(_Table, frozen=True, kw_only=True):
             torque_max_nm=g.torque_nm,
             speed_max_mps=g.speed_mps,
             box_m=np.array([g.lowest_m, g.highest_m]),
+            push_max_n=self.contact.force_max_n,
+            twist_max_nm=self.contact.torque_max_nm,
         )
 
     def port_tool(self) -> Tool:
@@ -259,7 +265,7 @@ def _check_ranges(bounds: Bounds) -> None:
 
 
 def _check_contact(bounds: Bounds) -> None:
-    """K clip <= F_max, for translation and rotation, with every stiffness the skill may ask for."""
+    """K clip <= F_max along each axis, with every stiffness the skill may ask for."""
     from shearline.evaluator.skill.manipulation import AXIAL_K  # noqa: PLC0415 - loads a compiler
 
     c = bounds.contact
@@ -269,7 +275,8 @@ def _check_contact(bounds: Bounds) -> None:
     ):
         if k * clip > most * (1.0 + 1e-9):
             raise BoundsError(
-                f"contact.{what} = {k * clip:g} is more than the {most:g} that contact allows"
+                f"contact.{what} = {k * clip:g} is more than the {most:g} that contact allows along"
+                " each axis"
             )
     for name in ("con_k_xy", "ins_k_xy"):
         if (k := bounds.range_of(name)[1]) > c.stiffness_max_npm:

@@ -211,7 +211,16 @@ def tared(row: Array, tare: Array) -> Array:
     return clean
 
 
-def beyond(rows: list[Array], drive: Drive) -> str:
+def beyond(rows: list[Array], drive: Drive) -> MotionEnded | None:
+    """Return why the newest of ``rows`` is to end a contact: the soft guard, or what cannot be."""
+    if not np.isfinite(rows[-1]).all():  # compares as within every limit
+        return MotionEnded(Ending.INVALID, "the robot says numbers that are not finite")
+    if reason := _left(rows, drive):
+        return MotionEnded(Ending.GUARD, f"the guard ended the contact: {reason}")
+    return None
+
+
+def _left(rows: list[Array], drive: Drive) -> str:
     """Say what of the soft guard the newest of ``rows`` leaves, or ``""``."""
     guard, row = drive.guard, tared(rows[-1], drive.tare)
     sample = sample_of(row, Mode.MOVE)

@@ -11,6 +11,7 @@ in a thread of its own and :meth:`Franka.sample` waits for it only a moment.
 
 from __future__ import annotations
 
+import functools
 import threading
 import time
 from collections.abc import Callable
@@ -33,9 +34,10 @@ from shearline.evaluator.robot.errors import (
     RobotRefused,
     RobotUnreachable,
 )
-from shearline.evaluator.robot.frames import apart
+from shearline.evaluator.robot.free import ARRIVED_RADPS, arrived, free_motion
 from shearline.evaluator.robot.path import Line, off, shifted
 from shearline.evaluator.robot.port import (
+    TARE_SHARE,
     Array,
     Consent,
     Contact,
@@ -45,22 +47,19 @@ from shearline.evaluator.robot.port import (
     Tool,
 )
 from shearline.evaluator.robot.reader import Reader
-
-#: Stiffness of free motions [N/m, N m/rad] and the error that pulls at most [m, rad].
-FREE_STIFFNESS = np.array([2000.0] * 3 + [100.0] * 3)
-FREE_CLIP_M, FREE_CLIP_RAD = 0.02, 0.2
+from shearline.evaluator.robot.session import Session
 
 #: Between two references of a free motion [s]; one never advances by more than twice that.
 REFERENCE_S = 5e-3
-
-#: A free motion has arrived within these [m, rad], at this speed of the joints [rad/s].
-ARRIVED_M, ARRIVED_RAD, ARRIVED_RADPS = 2e-4, 1e-3, 5e-3
 
 #: The reference of an arm that stands off the goal is shifted by this share of the error a step.
 TRIM = 0.02
 
 #: The robot's own threshold for forces: above the guard, which acts first.
 REFLEX_SHARE = 1.3
+
+#: A brake that was not heard is repeated after this [s].
+BRAKE_AGAIN_S = 5e-3
 
 #: The tare is the mean of so many states, over so long [s].
 TARE_SAMPLES, TARE_S = 20, 0.1
@@ -172,26 +171,37 @@ class Franka:
 
     # -- guard ------------------------------------------------------------------------------------
 
-    def set_guard(self, guard: Guard) -> None:
-        """Keep to a guard, and tare."""
+    def set_guard(self, guard: Guard, *, tare: bool = True) -> None:
+        """Keep to a guard, and tare unless told not to."""
         self._expect_open()
         if self._client.running() or np.abs(self.sample().dq).max() > ARRIVED_RADPS:
             raise RobotRefused("the arm moves, expected it at rest: set its limits before it moves")
-        self._guard = guard
-        self._tare = np.zeros(FELT.size)
-        felt = [self._felt() for _ in range(TARE_SAMPLES)]
-        self._tare = np.mean(felt, axis=0)
-        self._limit()
+        zero = self._zero(guard) if tare else self._tare
+        self._limit(guard, zero)
+        self._guard, self._tare = guard, zero
+
+    def _zero(self, guard: Guard) -> Array:
+        """Return what the robot feels at rest, untared, if that can be nothing."""
+        felt = np.mean([self._felt() for _ in range(TARE_SAMPLES)], axis=0) + self._tare
+        tau, force, torque = felt[:JOINTS], *map(np.linalg.norm, (felt[JOINTS:10], felt[10:]))
+        most = TARE_SHARE * np.array([*guard.tau_ext_max, guard.force_max_n, guard.torque_max_nm])
+        if not (np.array([*np.abs(tau), force, torque]) <= most).all():  # also NaN
+            raise RobotRefused(
+                f"at rest the tip feels {force:.1f} N and {torque:.2f} N m and a joint"
+                f" {np.abs(tau).max():.1f} N m, expected at most {TARE_SHARE:.0%} of the guard:"
+                " free the tool, or correct its mass"
+            )
+        zero: Array = felt
+        return zero
 
     def _felt(self) -> Array:
         time.sleep(TARE_S / TARE_SAMPLES)
         sample = self.sample()
         return np.concatenate([sample.tau_ext, sample.o_f_ext])
 
-    def _limit(self) -> None:
+    def _limit(self, guard: Guard, tare: Array) -> None:
         """Have the robot itself stop at the guard's torques, and beyond the guard's forces."""
-        assert self._guard is not None
-        guard, off = self._guard, np.abs(self._tare)
+        off = np.abs(tare)
         force = np.array([guard.force_max_n] * 3 + [guard.torque_max_nm] * 3)
         self._client.set_limits(
             guard.tau_ext_max + off[:JOINTS], REFLEX_SHARE * force + off[JOINTS:]
@@ -204,10 +214,12 @@ class Franka:
         self._expect_ready()
         assert self._guard is not None
         drive = Drive(contact, self._guard, self._tare)
-        self._session = Session(self, self._client)
-        self._client.begin(drive)
-        if self._latch is not None:  # somebody stopped it while it began
-            _quietly(self._client.brake)
+        session = self._session = Session(self, self._client)
+        try:
+            self._client.begin(drive)
+        except BaseException:
+            session.over = True
+            raise
         deadline = time.monotonic() + START_S
         while self._client.newest() is None:
             if not self._client.running():
@@ -216,11 +228,17 @@ class Franka:
                 self._client.finish()
                 raise self._latched(Ending.INVALID, f"no state came in {START_S} s of a motion")
             time.sleep(1e-3)
-        return self._session
+        return session
 
     def is_current(self, session: Session) -> bool:
         """Tell whether a session is that of the last contact."""
         return session is self._session
+
+    def may_aim(self, pose: Array) -> bool:
+        """Tell whether a pose may be aimed at; latch if it is none."""
+        if not np.isfinite(pose).all():
+            self._latched(Ending.INVALID, "a reference has numbers that are not finite")
+        return self._latch is None
 
     def move_free(self, o_t_ee: Array, speed_mps: float) -> None:
         """Move along a straight line, and correct what friction leaves at its end."""
@@ -230,13 +248,11 @@ class Franka:
         if (o_t_ee[:3, 3] < low).any() or (o_t_ee[:3, 3] > high).any():
             goal = np.round(o_t_ee[:3, 3], 4).tolist()
             raise MotionEnded(Ending.GUARD, f"the goal {goal} m is outside of the tip's box")
-        line = Line(self.sample().o_t_ee, o_t_ee, speed_mps)
-        clip_m = min(FREE_CLIP_M, self._guard.force_max_n / FREE_STIFFNESS[0])
-        session = self.contact(
-            Contact(
-                np.eye(3), FREE_STIFFNESS, 1.0, clip_m, FREE_CLIP_RAD, 2.0 * line.length_s + 5.0
-            )
-        )
+        start = self.sample().o_t_ee
+        if not (np.isfinite(start).all() and np.isfinite(o_t_ee).all()):
+            raise self._latched(Ending.INVALID, "start or goal has numbers that are not finite")
+        line, contact = free_motion(start, o_t_ee, speed_mps, self._guard)
+        session = self.contact(contact)
         try:
             self._follow(session, line, o_t_ee)
         except BaseException:
@@ -255,7 +271,7 @@ class Franka:
             at_s += min(now.t_s - before.t_s, 2.0 * REFERENCE_S)
             before = now
             if at_s >= line.length_s:
-                if _arrived(now, goal):
+                if arrived(now, goal):
                     return
                 shift += TRIM * off(now.o_t_ee, goal)
 
@@ -287,8 +303,21 @@ class Franka:
     def stop(self) -> None:
         """Latch, and have the robot brake."""
         self._latched(Ending.STOPPED, "stopped on request")
-        if self._open and self._client.running():
-            threading.Thread(target=_quietly, args=(self._client.brake,), daemon=True).start()
+        session = self._session
+        if self._open and session is not None and not session.over:
+            brake = functools.partial(self._brake, session)
+            threading.Thread(target=_quietly, args=(brake,), daemon=True).start()
+
+    def _brake(self, session: Session) -> None:
+        """Brake until the motion is over: one that only just begins may not hear the first."""
+        deadline, ran = time.monotonic() + START_S, False
+        while self._open and session is self._session and not session.over:
+            runs = self._client.running()
+            if (ran and not runs) or time.monotonic() > deadline:
+                return
+            ran = ran or runs
+            _quietly(self._client.brake)
+            time.sleep(BRAKE_AGAIN_S)
 
     def recover(self, consent: Consent) -> None:
         """Clear the latch and the robot's errors."""
@@ -302,7 +331,7 @@ class Franka:
         except MotionEnded as ended:
             raise RobotUnreachable(str(ended)) from ended
         if self._guard is not None:
-            self._limit()
+            self._limit(self._guard, self._tare)
         self._latch = None
 
     def _answers(self) -> bool:
@@ -356,45 +385,6 @@ class Franka:
             raise self._latched(Ending.INVALID, "the robot sends no new states: its clock stands")
         if self._guard is None:
             raise RobotRefused("no limits were set, expected set_guard() before the first motion")
-
-
-class Session:
-    """A running contact of a :class:`Franka`; a :class:`ContactSession`."""
-
-    def __init__(self, port: Franka, client: Client) -> None:
-        self._port = port
-        self._client = client
-        self._over = False
-
-    def ref(self, o_t_ee: Array) -> None:
-        """Set the reference."""
-        if not self._port.is_current(self):
-            raise MotionEnded(Ending.STOPPED, "another contact has begun")
-        if self._over or not self._client.running():
-            self._raise()
-        self._client.aim(o_t_ee)
-
-    def end(self) -> None:
-        """Come to rest and leave the motion."""
-        if self._over or not self._port.is_current(self):
-            return
-        if not self._client.running():
-            self._raise()
-        self._over = True
-        self._client.finish()
-        how = self._port.ended()
-        if how is not None:
-            raise how
-
-    def _raise(self) -> None:
-        self._over = True
-        raise self._port.ended() or MotionEnded(Ending.STOPPED, "the contact is over")
-
-
-def _arrived(sample: Sample, goal: Array) -> bool:
-    off_m, off_rad = apart(goal, sample.o_t_ee)
-    speed = float(np.abs(sample.dq).max())
-    return off_m < ARRIVED_M and off_rad < ARRIVED_RAD and speed < ARRIVED_RADPS
 
 
 def _quietly(act: Callable[[], None]) -> None:

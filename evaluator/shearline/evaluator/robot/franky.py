@@ -72,7 +72,7 @@ class FrankyClient:
         self._motion: Any = None
         self._active = False
         self._asked = False
-        self._left = ""
+        self._left: MotionEnded | None = None
         self._failed: Exception | None = None
 
     def connect(self, address: str) -> str:
@@ -156,7 +156,7 @@ class FrankyClient:
         for condition in (late, _forced(franky, drive)):
             motion.add_reaction(franky.TorqueReaction(condition, self._stop_motion(BRAKE_S)))
         self._drive, self._motion = drive, motion
-        self._asked, self._left, self._failed = False, "", None
+        self._asked, self._left, self._failed = False, None, None
         with self._lock:  # states of the motion before may still be on their way
             self._after_s, self._count = state.time.to_sec(), 0
         try:
@@ -182,9 +182,9 @@ class FrankyClient:
             if self._count == 1:
                 self._began_s = float(row[0])
             rows = self._rows[-min(self._count, SPEED_STATES + 1) :]
-        if self._count % LOOK == 0 and not self._left and self._drive is not None:
+        if self._count % LOOK == 0 and self._left is None and self._drive is not None:
             self._left = beyond(rows, self._drive)
-            if self._left:
+            if self._left is not None:
                 self._wind_down()
 
     def aim(self, pose: Array) -> None:
@@ -244,8 +244,8 @@ class FrankyClient:
         drive, self._drive = self._drive, None
         if drive is None or self._asked:
             return None
-        if self._left:
-            return MotionEnded(Ending.GUARD, f"the guard ended the contact: {self._left}")
+        if self._left is not None:
+            return self._left
         lasted_s = self._settle()
         if lasted_s >= drive.contact.t_max_s - 2.0 * BRAKE_S:
             return MotionEnded(Ending.TIME, f"the contact ended after its {lasted_s:.3f} s")

@@ -47,7 +47,7 @@ def dry_run(
         terminal.say(f"{name}: {wear.get(name, 0)} of {most} insertions")
     c = bounds.contact
     terminal.say(
-        f"contacts: at most {c.stiffness_max_npm * c.clip_m:g} N at rest,"
+        f"contacts: at most {c.stiffness_max_npm * c.clip_m:g} N along each axis at rest,"
         f" references at {c.reference_hz:g} Hz and at most {c.reference_mps:g} m/s"
     )
     if not inside:

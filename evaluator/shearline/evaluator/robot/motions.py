@@ -78,7 +78,6 @@ class Mover:
         self._o_t_lock = o_t_lock
         self._watch = self._watching()
         self._stood: Array | None = None
-        self._serving = False
         self._asked_s = 0.0
         self._retracting = False
         self._rehearsed = False
@@ -188,7 +187,7 @@ class Mover:
         if self._retracting or self.state not in MOVING:
             return
         why = self.peer.halt_why or self.peer.leaving
-        if not why and self._serving and self._bounds.link_loss == "stop":
+        if not why and self.peer.running and self._bounds.link_loss == "stop":
             lost = self.peer.link(time.monotonic()) is Link.LOST
             why = "the learner cannot be reached, and link_loss is 'stop'" if lost else ""
         if why:

@@ -202,7 +202,8 @@ class PandaClient:
                 if row is not None and (not rows or row[0] > rows[-1][0]):
                     rows = [*rows[-2:], row]
                     self._how = self._judge(rows, drive)
-                    self._send(drive.contact, row)
+                    if self._how is None:
+                        self._send(drive.contact, row)
                 self._panda.raise_error()
                 time.sleep(LOOK_S)
             self._settle()
@@ -219,9 +220,7 @@ class PandaClient:
         if left_s <= 0.0:
             return MotionEnded(Ending.TIME, f"the contact ended after its {lasted_s:.3f} s")
         signal.setitimer(signal.ITIMER_REAL, max(left_s + BRAKE_S - NOTICE_S, self._hang_s))
-        if reason := beyond(rows, drive):
-            return MotionEnded(Ending.GUARD, f"the guard ended the contact: {reason}")
-        return None
+        return beyond(rows, drive)
 
     def _send(self, contact: Contact, row: Array) -> None:
         """Aim at the target, but no farther from where the arm is than the clip."""
@@ -231,7 +230,7 @@ class PandaClient:
     def _settle(self) -> None:
         """Aim at where the arm is for a moment, so that it is left at rest."""
         row = self.newest()
-        if row is not None:
+        if row is not None and np.isfinite(row[POSE]).all():
             pose = row[POSE].reshape(4, 4)
             self._controller.set_control(pose[:3, 3], quaternion(pose[:3, :3]), self._posture)
             begun = self._controller.get_time()

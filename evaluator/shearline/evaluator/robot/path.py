@@ -27,17 +27,21 @@ class Line:
         begin: Pose ``(4, 4)``.
         end: Pose ``(4, 4)``.
         speed_mps: Largest speed of the tip.
+        speed_radps: Largest speed of turning.
 
     Attributes:
         length_s: How long it takes [s].
     """
 
-    def __init__(self, begin: Array, end: Array, speed_mps: float) -> None:
+    def __init__(
+        self, begin: Array, end: Array, speed_mps: float, speed_radps: float = math.inf
+    ) -> None:
         self._begin, self._end = begin, end
         off_m, off_rad = apart(begin, end)
         self._turn = off_rad
         self._axis = axis(begin[:3, :3].T @ end[:3, :3])
-        self.length_s = PEAK_RATE * max(off_m, LEVER_M * off_rad) / (SPEED_SHARE * speed_mps)
+        turning_s = off_rad / min(speed_mps / LEVER_M, speed_radps)
+        self.length_s = PEAK_RATE * max(off_m / speed_mps, turning_s) / SPEED_SHARE
 
     def at(self, t_s: float) -> Array:
         """Return the pose at a time from the beginning [s]."""

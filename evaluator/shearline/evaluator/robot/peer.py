@@ -5,7 +5,7 @@ Written by the thread that listens, read by the one that moves the arm.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from shearline.evaluator.robot import pipe
 from shearline.evaluator.robot.states import Link
@@ -17,13 +17,24 @@ class Gone:
 
 @dataclass(slots=True)
 class Peer:
-    """The worker, as last heard; written by the thread that listens."""
+    """The worker, as last heard; written by the thread that listens.
+
+    Attributes:
+        halts: Token of each attempt that is to end, and why.
+        running: Token of the attempt that runs; written by the thread that moves the arm.
+    """
 
     linked: bool = True
     held: bool = False
     heard_s: float = 0.0
-    halt_why: str = ""
+    halts: dict[str, str] = field(default_factory=dict)
+    running: str = ""
     leaving: str = ""
+
+    @property
+    def halt_why(self) -> str:
+        """Why the attempt that runs is to end, or ``""``."""
+        return self.halts.get(self.running, "")
 
     def link(self, now_s: float) -> Link:
         """Return whether the learner can be reached through the worker."""

@@ -42,8 +42,9 @@ class Try(Say, frozen=True, kw_only=True, tag="try"):
 
 
 class Stop(Say, frozen=True, kw_only=True, tag="stop"):
-    """End the running trial without a verdict and bring the key out."""
+    """End the trial of this attempt without a verdict and bring the key out."""
 
+    token: str
     why: str
 
 

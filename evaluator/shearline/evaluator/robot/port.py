@@ -100,6 +100,8 @@ class Guard:
         torque_max_nm: Largest external torque on the tip [N m].
         speed_max_mps: Largest speed of the tip [m/s].
         box_m: Lowest and highest corner of where the tip may be, base frame ``(2, 3)`` [m].
+        push_max_n: Largest force that the arm itself exerts at rest in a free motion [N].
+        twist_max_nm: Largest torque that it exerts at rest there, about each axis [N m].
     """
 
     tau_ext_max: Array
@@ -107,6 +109,8 @@ class Guard:
     torque_max_nm: float
     speed_max_mps: float
     box_m: Array
+    push_max_n: float = 40.0
+    twist_max_nm: float = 12.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -122,10 +122,8 @@ def listen(end: pipe.Pipe, inbox: SimpleQueue[Any], peer: Peer) -> None:
                 case pipe.Look(linked=linked, held=held):
                     peer.linked, peer.held = linked, held
                     continue
-                case pipe.Try():
-                    peer.halt_why = ""  # here and in order: a stop that follows is for this one
-                case pipe.Stop(why=why):
-                    peer.halt_why = why
+                case pipe.Stop(token=token, why=why):
+                    peer.halts[token] = why
                     continue
                 case pipe.Leave(why=why):
                     peer.leaving = why

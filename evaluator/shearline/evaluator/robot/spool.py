@@ -2,7 +2,8 @@
 
 The arm's process puts a result here before anybody hears of it; the worker takes it away when the
 learner's acknowledgement came. Whoever dies in between, the next worker of this robot finds the
-result and delivers it, to the run that it belongs to and to no other.
+result and delivers it, to the run that it belongs to and to no other; and under the name under
+which it was measured, for a learner counts no result of an evaluator that had no such attempt.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 import msgspec
 
 from shearline.evaluator.robot.store import sync, write
+from shearline.protocol.errors import ConfigError
 from shearline.protocol.messages import Result
 
 
@@ -32,7 +34,26 @@ class Spool:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._owner = folder / "evaluator"
         folder.mkdir(parents=True, exist_ok=True)
+
+    def expect(self, name: str) -> None:
+        """Check that an evaluator of this name may deliver what is here.
+
+        Raises:
+            ConfigError: If results are owed under another name.
+        """
+        owner = self._owner.read_text() if self._owner.exists() else name
+        owed = sum(1 for _ in self._folder.glob("*.json"))
+        if owed and owner != name:
+            raise ConfigError(
+                f"evaluator {owner!r} still owes {owed} results in {self._folder} and this one is"
+                f" {name!r}: start it with --name {owner}, or delete them if their run is gone"
+            )
+
+    def own(self, name: str) -> None:
+        """Keep results under this name from now on."""
+        write(self._owner, name.encode())
 
     def put(self, run: str, result: Result) -> None:
         """Keep a result; once for each token, the first one stays."""

@@ -6,6 +6,7 @@ Nothing in this process, which is on the network, can move, arm or recover the a
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import subprocess
 import sys
@@ -21,6 +22,7 @@ import numpy as np
 from shearline.evaluator.base import Array, Outcome, Trace, TrialAborted, TrialRejected
 from shearline.evaluator.keylock_spec import keylock_spec
 from shearline.evaluator.robot import pipe
+from shearline.evaluator.robot.bounds import read_bounds
 from shearline.evaluator.robot.process import Orders, folder_of
 from shearline.evaluator.robot.spool import Spool
 from shearline.protocol.errors import ConfigError, LinkError, ShearlineError
@@ -33,8 +35,12 @@ BEAT_S = 0.05
 #: An arm's process that starts may need so long for imports and the robot's connection [s].
 START_S = 60.0
 
-#: How long a stopped arm may take to answer before its process counts as frozen [s].
-STOP_S = 5.0
+#: A stopped arm that is alive may take so long up the ladder and back to the start pose [s].
+FAREWELL_S = 60.0
+
+#: Looks without a sign of life after which the arm's process is frozen. Looks are counted, not
+#: seconds: this process may have been frozen itself.
+DEAF_LOOKS = round(pipe.SILENCE_S / pipe.PULSE_S)
 
 
 class RobotDown(ShearlineError):  # noqa: N818 - a state, not a mistake
@@ -73,25 +79,27 @@ class RobotTask:
         terminal: What the arm's process reads the operator from; ``None`` for our standard input.
 
     Raises:
-        ConfigError: If there is no such level.
+        ConfigError: If there is no such level, or the bounds file is not sound.
     """
 
     kind = "robot"
+    farewell_s = FAREWELL_S
 
     def __init__(self, orders: Orders, terminal: int | None = None) -> None:
         self._orders = orders
         self._terminal = terminal
         self._spec = keylock_spec(orders.task)
+        read_bounds(Path(orders.bounds))  # before a folder is made beside a file that is not there
         self.spool = Spool(folder_of(Path(orders.bounds)) / "spool")
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: pipe.Pipe | None = None
         self._answers: SimpleQueue[pipe.Answer] = SimpleQueue()
-        self._heard_s = time.monotonic()
+        self._heard = threading.Event()
         self._stands = threading.Event()
         self._engine = ""
         self._over: pipe.Over | None = None
         self._trial: Trial | None = None
-        self._run = ""
+        self._run = self._name = ""
         self._say_ready: Callable[[bool], None] = lambda _ready: None
         self._say_over: Callable[[int, str], None] = lambda _code, _why: None
         self._look: Callable[[], tuple[bool, bool]] = lambda: (True, False)
@@ -110,11 +118,18 @@ class RobotTask:
 
     def join(
         self,
+        name: str,
         ready: Callable[[bool], None],
         over: Callable[[int, str], None],
         look: Callable[[], tuple[bool, bool]],
     ) -> None:
-        """Be told how to say that trials may come, that all is over, and what the link does."""
+        """Be told how to say that trials may come, that all is over, and what the link does.
+
+        Raises:
+            ConfigError: If results are owed under another name.
+        """
+        self.spool.expect(name)
+        self._name = name
         self._say_ready, self._say_over, self._look = ready, over, look
 
     def announce(self, run: str, trial: Trial) -> None:
@@ -132,7 +147,6 @@ class RobotTask:
             RobotDown: If the robot refuses.
         """
         self._process, self._pipe = start_process(self._orders, self._terminal)
-        self._heard_s = time.monotonic() + START_S
         threading.Thread(target=self._listen, daemon=True, name="arm").start()
         self._stands.wait(START_S)
         over = self._over
@@ -140,7 +154,9 @@ class RobotTask:
             self.close()
             raise {2: ConfigError, 3: LinkError}.get(over.code, RobotDown)(over.why)
         if not self._engine:
+            self._process.kill()
             raise RobotDown(f"the arm's process said nothing for {START_S:g} s")
+        self.spool.own(self._name)  # not before: now the folder is this robot's and nobody else's
         threading.Thread(target=self._pulse, daemon=True, name="pulse").start()
 
     def run(self, theta: Array, seed: int, beat: Callable[[], None]) -> Outcome:  # noqa: ARG002
@@ -153,49 +169,45 @@ class RobotTask:
         trial = self._trial
         assert trial is not None, "announce() comes first"
         self._say(pipe.Try(run=self._run, trial=trial))
-        while True:
-            try:
-                answer = self._answers.get(timeout=BEAT_S)
-            except Empty:
-                self._check()
-                try:
-                    beat()
-                except TrialAborted as stopped:
-                    return self._stop(trial, stopped)
-                continue
-            if answer.result.token == trial.token:
-                return outcome_of(answer)
+        try:
+            answer = self._wait(trial.token, beat)
+        except TrialAborted:
+            kept = [r for r in self.spool.pending(self._run) if r.token == trial.token]
+            if not kept:
+                raise
+            answer = pipe.Answer(result=kept[0])  # measured, though nobody was left to say it
+        return outcome_of(answer)
 
     def close(self) -> None:
-        """Have the arm's process bring the key out and end; wait for it a little."""
+        """Have the arm's process bring the key out and end; wait until it has.
+
+        Its terminal is this process's too: the operator can type ``stop`` as long as this one is
+        there. An arm's process that falls silent is ended by the thread that hears it.
+        """
         self._say(pipe.Leave(why="the worker leaves"))
         if self._process is not None:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(STOP_S)
+            self._process.wait()
 
-    def _stop(self, trial: Trial, stopped: TrialAborted) -> Outcome:
-        """Ask the arm to stop, and give its answer, which is the one in the spool."""
-        self._say(pipe.Stop(why=str(stopped)))
-        end_s = time.monotonic() + STOP_S
+    def _wait(self, token: str, beat: Callable[[], None]) -> pipe.Answer:
+        """Wait for the arm's answer; once ``beat`` raises, stop the arm and wait on."""
+        stopped: TrialAborted | None = None
+        end_s = math.inf
         while time.monotonic() < end_s:
             with contextlib.suppress(Empty):
                 answer = self._answers.get(timeout=BEAT_S)
-                if answer.result.token == trial.token:
-                    return outcome_of(answer)
-            self._check()
+                if answer.result.token == token:
+                    return answer
+                continue
+            if self._over is not None:
+                raise TrialAborted(f"{self._over.why}; the key may be in the lock")
+            if stopped is None:
+                try:
+                    beat()
+                except TrialAborted as why:
+                    stopped, end_s = why, time.monotonic() + FAREWELL_S
+                    self._say(pipe.Stop(token=token, why=str(why)))
+        assert stopped is not None
         raise stopped
-
-    def _check(self) -> None:
-        """Notice that the arm's process died or froze; it is then ended for good."""
-        silent_s = time.monotonic() - self._heard_s
-        process = self._process
-        assert process is not None
-        if self._over is None and silent_s > pipe.SILENCE_S:
-            # Its client gone, the robot stops by itself; thawed, it might go on.
-            process.kill()
-            self._end(4, f"the arm's process has been silent for {silent_s:.1f} s and was ended")
-        if self._over is not None:
-            raise TrialAborted(f"{self._over.why}; the key may be in the lock")
 
     def _end(self, code: int, why: str) -> None:
         if self._over is None:
@@ -210,10 +222,19 @@ class RobotTask:
                 self._pipe.send(message)
 
     def _pulse(self) -> None:
-        """Tell the arm's process that this one lives, and how its link is."""
+        """Tell the arm's process that this one lives, and how its link is; end a frozen one."""
+        deaf = 0
         while self._over is None:
             linked, held = self._look()
             self._say(pipe.Look(linked=linked, held=held))
+            deaf = 0 if self._heard.is_set() else deaf + 1
+            self._heard.clear()
+            if deaf > DEAF_LOOKS:
+                assert self._process is not None
+                # Its client gone, the robot stops by itself; thawed, it might go on.
+                self._process.kill()
+                silent = f"has been silent for {pipe.SILENCE_S:g} s"
+                self._end(4, f"the arm's process {silent} and was ended")
             time.sleep(pipe.PULSE_S)
 
     def _listen(self) -> None:
@@ -228,7 +249,7 @@ class RobotTask:
             self._end(4, "the arm's process has died")
 
     def _hear(self, message: pipe.Pulse | pipe.Stands | pipe.Answer | pipe.Over) -> None:
-        self._heard_s = time.monotonic()
+        self._heard.set()
         match message:
             case pipe.Stands(engine=engine, takes=takes):
                 self._engine = engine

@@ -1,0 +1,150 @@
+"""What both Frankas keep to whatever their library does: stops, lies, tares, free motions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from emulator.kit import contact
+from evaluator.robot.clockwork import Clockwork, limits, port
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shearline.evaluator.robot.client import COLUMNS, Drive, beyond
+from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotRefused
+from shearline.evaluator.robot.free import STIFFNESS, free_motion
+from shearline.evaluator.robot.port import Array
+
+
+def goal(x_m: float) -> Array:
+    made = np.eye(4)
+    made[0, 3] = x_m
+    return made
+
+
+# -- stops ----------------------------------------------------------------------------------------
+
+
+def test_a_stop_that_the_library_does_not_hear_at_first_brakes_all_the_same() -> None:
+    client = Clockwork()
+    made = port(client)
+    made.contact(contact(5.0))
+    client.deaf = 3  # it has begun and does not say so yet
+    made.stop()
+    assert client.braked.wait(5.0)
+
+
+def test_nothing_is_aimed_at_once_a_stop_has_latched() -> None:
+    client = Clockwork()
+    made = port(client)
+    session = made.contact(contact(5.0))
+    session.ref(np.eye(4))
+    client.brake = lambda: None  # type: ignore[method-assign]  # lost on its way
+    made.stop()
+    with pytest.raises(MotionEnded) as ended:
+        session.ref(goal(0.001))
+    assert ended.value.ending is Ending.STOPPED
+    assert len(client.aims) == 1
+    assert not client.running()
+
+
+def test_a_stop_in_the_midst_of_a_free_motion_ends_it() -> None:
+    client = Clockwork()
+    made = port(client)
+    client.brake = lambda: None  # type: ignore[method-assign]
+    aim = client.aim
+
+    def stopping(pose: Array) -> None:
+        aim(pose)
+        if len(client.aims) == 3:
+            made.stop()
+
+    client.aim = stopping  # type: ignore[method-assign]
+    with pytest.raises(MotionEnded) as ended:
+        made.move_free(goal(0.1), 0.1)
+    assert ended.value.ending is Ending.STOPPED
+    assert len(client.aims) == 3
+
+
+# -- lies -----------------------------------------------------------------------------------------
+
+
+@given(st.integers(0, COLUMNS - 1), st.sampled_from([np.nan, np.inf, -np.inf]))
+def test_a_state_that_is_not_finite_is_beyond_every_guard(column: int, value: float) -> None:
+    row = np.zeros(COLUMNS)
+    drive = Drive(contact(5.0), limits(), np.zeros(13))
+    assert beyond([row], drive) is None
+    row[column] = value
+    ended = beyond([row], drive)
+    assert ended is not None
+    assert ended.ending is Ending.INVALID
+
+
+def test_a_free_motion_never_aims_at_what_is_no_pose() -> None:
+    client = Clockwork()
+    made = port(client)
+    client.lie = lambda pose: pose * np.nan if len(client.aims) > 4 else pose
+    with pytest.raises(MotionEnded) as ended:
+        made.move_free(goal(0.001), 0.1)
+    assert ended.value.ending is Ending.INVALID
+    assert np.isfinite(client.aims).all()
+    with pytest.raises(MotionEnded):  # it latches
+        made.contact(contact(1.0))
+
+
+@pytest.mark.parametrize("whose", ["start", "goal"])
+def test_a_free_motion_from_or_to_nowhere_does_not_begin(whose: str) -> None:
+    client = Clockwork()
+    made = port(client)
+    if whose == "start":
+        client.lie = lambda pose: pose * np.nan
+    with pytest.raises(MotionEnded) as ended:
+        made.move_free(goal(np.nan if whose == "goal" else 0.01), 0.1)
+    assert ended.value.ending is Ending.INVALID
+    assert client.drives == []
+
+
+# -- tares ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("of", [2, 7, 11])
+def test_a_tare_above_a_quarter_of_the_guard_is_refused_and_changes_nothing(of: int) -> None:
+    client = Clockwork()
+    made = port(client)
+    before = made.sample()
+    client.felt = client.felt.copy()
+    client.felt[of] += 15.5
+    with pytest.raises(RobotRefused, match="25% of the guard"):
+        made.set_guard(replace(limits(), torque_max_nm=15.0))
+    after = made.sample()
+    felt = np.concatenate([after.tau_ext - before.tau_ext, after.o_f_ext - before.o_f_ext])
+    assert felt[of] == pytest.approx(-15.5)
+    made.move_free(goal(0.0), 0.1)  # the guard before still holds
+
+
+def test_a_guard_may_be_set_without_a_tare() -> None:
+    client = Clockwork()
+    made = port(client)
+    client.felt = client.felt + 20.0  # the key is jammed
+    made.set_guard(limits(), tare=False)
+    assert made.sample().o_f_ext == pytest.approx(np.full(6, -20.0))
+    made.contact(contact(1.0)).end()
+    assert client.drives[-1].tare == pytest.approx(np.full(13, -0.1))
+
+
+# -- free motions ---------------------------------------------------------------------------------
+
+
+@given(st.floats(1.0, 40.0), st.floats(0.5, 12.0), st.floats(0.01, 0.25))
+def test_a_free_motion_pushes_no_harder_than_the_lab_allows_and_outruns_no_clip(
+    push_n: float, twist_nm: float, speed_mps: float
+) -> None:
+    line, free = free_motion(np.eye(4), goal(0.05), speed_mps, limits(push_n, twist_nm))
+    assert np.linalg.norm(STIFFNESS[:3] * free.clip_m) <= push_n * (1.0 + 1e-9)
+    assert STIFFNESS[3] * free.clip_rad <= twist_nm * (1.0 + 1e-9)
+    t_s = np.linspace(0.0, line.length_s, 200)
+    x_m = [line.at(t)[0, 3] for t in t_s]
+    speed = np.max(np.diff(x_m)) / (t_s[1] - t_s[0])
+    assert speed <= speed_mps
+    assert 2.0 * np.sqrt(STIFFNESS[0]) * speed <= STIFFNESS[0] * free.clip_m
