@@ -3,6 +3,8 @@
 `Slide` stands for the hardware and its driver; `Stage` is all that one writes to attach it.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotRefused
@@ -34,7 +36,7 @@ class Slide:
         if c is not None:
             k = c.stiffness[:3]
             pull = k * np.clip(c.o_r_c.T @ (goal - self.x), -c.clip_m, c.clip_m)
-            brake = 2.0 * c.damping_ratio * np.sqrt(k * MASS) * (c.o_r_c.T @ self.v)
+            brake = c.damping[:3] * (c.o_r_c.T @ self.v)
             self.v = self.v + TICK / MASS * (c.o_r_c @ (pull - brake) + self.force)
             self.x = self.x + TICK * self.v
         self.force = DOWN @ self.resistance(DOWN @ (self.x - MOUTH), DOWN @ self.v)
@@ -109,14 +111,16 @@ class Stage:
         if self.ended:
             raise self.ended
 
+    def gains(self, stiffness: np.ndarray, damping: np.ndarray) -> None:
+        self.task = self.task and replace(self.task, stiffness=stiffness, damping=damping)
+
     def end(self) -> None:
         self.task = None
-        if self.ended:
-            raise self.ended
+        self.ref(pose(self.slide.x, DOWN))  # raises if it had ended before
 
     def stop(self) -> None:
-        self.latch = MotionEnded(Ending.STOPPED, "the arm was stopped")
-        self._end(Ending.STOPPED, "the arm was stopped")
+        self.latch = self.ended = MotionEnded(Ending.STOPPED, "the arm was stopped")
+        self.task = None
 
     def recover(self, consent: Consent) -> None:
         self.latch = None
@@ -130,5 +134,4 @@ class Stage:
             raise self.latch or MotionEnded(Ending.GUARD, "the goal is outside the workspace")
 
     def _end(self, ending: Ending, what: str) -> None:
-        if self.task:
-            self.task, self.ended = None, MotionEnded(ending, what)
+        self.task, self.ended = None, MotionEnded(ending, what)

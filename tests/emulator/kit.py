@@ -40,7 +40,7 @@ def guard(force_n: float = 35.0, speed_mps: float = 0.3) -> Guard:
 
 def contact(t_max_s: float, clip_m: float = 0.01) -> Contact:
     """Return a contact with critical damping in the key's frame."""
-    return Contact(ROTATION, STIFFNESS, 1.0, clip_m, 0.1, t_max_s)
+    return Contact(ROTATION, STIFFNESS, 2.0 * np.sqrt(STIFFNESS), clip_m, 0.1, t_max_s)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ an impedance controller needs; mass and Coriolis terms are zero, for the arm mov
 
 from __future__ import annotations
 
+import functools
 import shutil
 import subprocess
 import tempfile
@@ -66,8 +67,9 @@ void g_NE(const double *q, const double *g, double m, const double *x, double *t
 """
 
 
+@functools.cache
 def library() -> bytes:
-    """Compile the library that a Panda hands out.
+    """Compile the library that a Panda hands out; once, for all who ask.
 
     Raises:
         RuntimeError: If this machine has no C compiler.

@@ -13,6 +13,7 @@ freeze | thaw         the robot's clock stands, states go on arriving
 nan | sane            positions, pose and wrench are no numbers
 zero | wrench         the wrench reads exactly zero
 bias FX FY FZ         the wrench is wrong by so much [N]
+grip FRICTION         the lock holds what it has, with such a coefficient of friction
 mode other|guiding|idle   e.g. brakes locked, led by hand
 recovery S            how long a recovery takes
 version N             what the robot says that it speaks
@@ -104,6 +105,10 @@ def _recovery(server: Server, seconds: str) -> None:
     server.robot.recovery_ms = round(1000.0 * float(seconds))
 
 
+def _grip(server: Server, friction: str) -> None:
+    server.robot.world.grip(float(friction))
+
+
 def _bias(server: Server, *force: str) -> None:
     server.robot.lies.bias[:3] = [float(part) for part in force]
 
@@ -128,6 +133,7 @@ _ORDERS: dict[str, Callable[..., None]] = {
     "zero": _lie("zero_wrench", value=True),
     "wrench": _lie("zero_wrench", value=False),
     "bias": _bias,
+    "grip": _grip,
     "mode": _mode,
     "recovery": _recovery,
     "version": _version,

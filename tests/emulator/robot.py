@@ -263,7 +263,7 @@ class Robot:
         state["q"] = state["q_d"] = state["theta"] = now.q
         state["dq"] = state["dq_d"] = state["dtheta"] = now.dq
         state["tau_J_d"] = self._tau
-        state["tau_J"] = self._tau + world.gravity()
+        state["tau_J"] = self._tau + world.gravity
         noise = self._chance.standard_normal(JOINTS + 6)
         state["tau_ext_hat_filtered"] = NOISE_NM * noise[:JOINTS] - world.tau_ext
         wrench = NOISE_N * noise[JOINTS:] - world.wrench + self.lies.bias

@@ -11,7 +11,8 @@ waits for is its pace:
 Between motions a state leaves each millisecond of the wall clock in both.
 
 A client's Python may lead the lockstep: after a datagram to the port :data:`LEAD` that says which
-time of the robot it has seen [ms], a motion goes at most :data:`AHEAD_MS` beyond; 0 lets it go.
+time of the robot it has seen [ms], this motion and all later ones of that client go at most
+:data:`AHEAD_MS` beyond what it has seen; 0 lets the motion go.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from emulator.wire import HEADER, Mode
 
 #: Where a client's Python says how far the robot may go, and how far that is.
 LEAD = 1338
-AHEAD_MS = 10
+AHEAD_MS = 5
 
 #: Between two states when nobody answers them [s].
 PERIOD_S = 1e-3
@@ -79,6 +80,7 @@ class Server:
         self._lead.bind((address, LEAD))
         self._lead.setblocking(False)  # noqa: FBT003 - as above
         self._led_ms: int | None = None
+        self._is_led = False
         self._tcp: socket.socket | None = None
         self._client: tuple[str, int] | None = None
         self._inbox, self._sent = b"", True
@@ -162,6 +164,7 @@ class Server:
         with contextlib.suppress(BlockingIOError):
             while True:
                 seen_ms = int(self._lead.recv(32))
+                self._is_led |= seen_ms > 0
                 self._led_ms = seen_ms + AHEAD_MS if seen_ms > 0 else None
 
     def _leads(self) -> bool:
@@ -229,6 +232,7 @@ class Server:
         if self._tcp is not None:
             self._tcp.close()
         self._tcp = self._client = self._led_ms = None
+        self._is_led = False
         if self.robot.motion is not None:
             self._miss()
 
@@ -276,7 +280,7 @@ class Server:
         elif request == "Move":
             controller, generator = struct.unpack_from("<II", payload)
             begun = robot.begin(identity, controller, generator)
-            self._led_ms = None  # Python looks again once it runs
+            self._led_ms = robot.time_ms + AHEAD_MS if self._is_led else None
             body = bytes([protocol.move.index("MotionStarted" if begun else "NotPossible")])
         elif request == "StopMove":
             self._reply_end(self._stop(), "Preempted")

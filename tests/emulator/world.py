@@ -28,6 +28,7 @@ class World:
         force_n: Force on the tip in the last tick, unfiltered.
         peak_n: The largest since the arm was placed.
         travel_m: How far the tip has gone since then.
+        gravity: Torques that hold the arm at rest here ``(7,)`` [N m].
     """
 
     def __init__(self) -> None:
@@ -45,14 +46,20 @@ class World:
         self._felt[:] = 0.0
         self.tau_ext, self.wrench = self._felt[:, 1], np.zeros(6)
         begin_tick(self._plant.handles, self.now)
+        self.gravity = self._gravity()
+
+    def grip(self, friction: float) -> None:
+        """Have everything that touches rub so hard, as if pins had broken; until placed anew."""
+        self._plant.model.geom_friction[:, 0] = friction
 
     def tick(self, tau: Array) -> None:
         """Go on by 1 ms under the client's torques ``tau (7,)``, without gravity [N m]."""
         now, felt = self.now, self._felt
         x, y, z = now.tip.tolist()
         limited = np.minimum(np.maximum(tau, -TORQUE_MAX), TORQUE_MAX)
-        end_tick(self._plant.handles, limited + self.gravity())
+        end_tick(self._plant.handles, limited + self.gravity)
         begin_tick(self._plant.handles, now)
+        self.gravity = self._gravity()
         felt[:, 0] = now.contact
         felt[:, 1] += FILTER * (now.contact - felt[:, 1])
         wrenches = np.linalg.solve(now.jacobian @ now.jacobian.T, now.jacobian @ felt)
@@ -73,8 +80,7 @@ class World:
         pose[:3, 3] = self.now.tip - pose[:3, 2] * TIP_M
         return pose
 
-    def gravity(self) -> Array:
-        """Return the torques that hold the arm at rest ``(7,)`` [N m]."""
+    def _gravity(self) -> Array:
         model, rest = self._plant.model, self._rest
         rest.qpos[:] = self._plant.data.qpos
         mujoco.mj_kinematics(model, rest)

@@ -55,6 +55,9 @@ class Clockwork:
         self.aims.append(pose)
         self.pose = pose
 
+    def tune(self, stiffness: Array, damping: Array) -> None:
+        pass
+
     def newest(self) -> Array | None:
         return self._row() if self._runs else None
 

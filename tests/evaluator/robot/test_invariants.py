@@ -207,6 +207,25 @@ def test_a_key_in_the_lock_survives_kill_9_and_is_pulled_out_at_the_next_start(
         assert not broken.in_contact()
 
 
+def test_a_key_that_the_lock_grips_jams_the_arm_with_the_gripper_closed(
+    cell: Make, robot: Emulator
+) -> None:
+    with cell() as armed:
+        armed.armed()
+        running = armed.start(theta=armed.theta(ins_speed=0.005))
+        armed.until(lambda: robot.report()["depth_m"] > 0.01, "a key half in")
+        robot.order("grip 50")
+        assert running.outcome().success is False
+        armed.until(lambda: armed.stands() == "jammed", "jammed")
+        assert robot.report()["depth_m"] > 0.005
+        assert armed.in_contact()
+        moved = robot.report()["moves"]
+        for number in (1, 2):
+            armed.start(number).aborted()
+        armed.type("confirm")
+        assert robot.report()["moves"] == moved
+
+
 def test_a_trial_goes_on_when_the_learner_is_lost_and_its_result_waits(cell: Make) -> None:
     with cell() as armed:
         armed.armed()

@@ -3,70 +3,31 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
-from emulator.kit import Kind, tool
+from emulator.compare import LAB, insert
+from emulator.kit import Kind
 from emulator.process import Emulator
 
-from shearline.evaluator.keylock import KeylockTask
-from shearline.evaluator.robot.bounds import Bounds, read_bounds
+from shearline.evaluator.robot.bounds import read_bounds
 from shearline.evaluator.robot.errors import MotionEnded
-from shearline.evaluator.robot.frames import pose
-from shearline.evaluator.robot.ladder import extract
 from shearline.evaluator.robot.log import missing
-from shearline.evaluator.robot.trial import Insertion, Report, Work, to_start
-from shearline.evaluator.robot.watch import Watch
+from shearline.evaluator.robot.port import Array
+from shearline.evaluator.robot.trial import Report
 from shearline.evaluator.skill import semantic
-from shearline.evaluator.skill.parameters import parameters
-from shearline.sims.scene import believed_lock_pose
-
-LAB = Path(__file__).parents[3] / "docs" / "examples" / "lab.toml"
 
 
-@pytest.fixture(scope="module")
-def task() -> KeylockTask:
-    task = KeylockTask()
-    task.warm()
-    return task
-
-
-def work(task: KeylockTask, lab: Bounds) -> Work:
-    """Return a trial of the lab's canary."""
-    space = task.spec.space
-    named = {name: (space[name][1] + space[name][2]) / 2.0 for name in space}
-    theta = np.array(list((named | dict(lab.canary.theta)).values()))
-    believed = believed_lock_pose()
-    o_t_lock = pose(believed.position, believed.rotation)
-    return Work(parameters(theta), task.limits(), o_t_lock, lab)
-
-
-def trial(kind: Kind, robot: Emulator, task: KeylockTask, seed: int) -> tuple[Report, Any]:
-    """Run one trial, pull the key out, and return its report and the log."""
+def trial(kind: Kind, robot: Emulator, seed: int) -> tuple[Report, Array]:
+    """Run one trial of the lab's canary, pull the key out, and return its report and the log."""
     lab = read_bounds(LAB)
-    robot.order(f"place {seed}")
-    port = kind.led(robot.address)
-    port.open(tool())
-    try:
-        port.set_guard(lab.port_guard())
-        watch, report, job = Watch(port), Report(), work(task, lab)
-        to_start(port, watch, job)
-        insertion = Insertion(port, watch, job, report)
-        insertion.approach()
-        insertion.insert()
-        assert extract(port, watch, job, report)
-        return report, port.drain_log()
-    finally:
-        port.close()
+    return insert(kind, robot, lab.canary_tuple(), lab, f"place {seed}")
 
 
 @pytest.mark.slow
 def test_a_tuple_that_opens_the_lock_in_simulation_opens_it_through_the_real_client(
-    kind: Kind, robot: Emulator, task: KeylockTask
+    kind: Kind, robot: Emulator
 ) -> None:
-    report, log = trial(kind, robot, task, seed=1)
+    report, log = trial(kind, robot, seed=1)
     assert report.end.verdict == semantic.SUCCESS
     assert report.end.depth_m > 0.024
     assert missing(log, report.stretches) == 0
@@ -76,12 +37,12 @@ def test_a_tuple_that_opens_the_lock_in_simulation_opens_it_through_the_real_cli
 
 @pytest.mark.bench
 @pytest.mark.long
-def test_twenty_trials(kind: Kind, robot: Emulator, task: KeylockTask) -> None:
+def test_twenty_trials(kind: Kind, robot: Emulator) -> None:
     """Print how long they take; on the first, the compiled layers are loaded."""
     begun, robot_s, opened, aborted = time.monotonic(), 0.0, 0, 0
     for seed in range(20):
         try:
-            report, log = trial(kind, robot, task, seed)
+            report, log = trial(kind, robot, seed)
         except MotionEnded as ended:  # a machine so crowded that Python was away for too long
             print(f"trial {seed}: {ended}")  # noqa: T201
             aborted += 1

@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shearline.evaluator.robot.frames import in_lock, is_pose
-from shearline.evaluator.robot.reference import Reference, contact_of, stiffness_of, target_of
+from shearline.evaluator.robot.reference import (
+    Reference,
+    contact_of,
+    damping_of,
+    stiffness_of,
+    target_of,
+)
 from shearline.evaluator.robot.sight import turn_of
 from shearline.evaluator.skill.manipulation import AXIAL_K, Command, empty_command
 
@@ -34,6 +40,13 @@ def test_a_push_becomes_the_displacement_that_pushes_as_hard_at_rest() -> None:
     assert stiffness_of(c)[2] == AXIAL_K
 
 
+def test_the_reference_leads_by_what_the_robot_takes_off_in_motion() -> None:
+    c = command(x=[0.0, 0.0, 0.02], wrench=[0.0, 0.0, 15.0, 0.0, 0.0, 0.0], v=[0.01, 0.0, 0.03])
+    stiffness, speed = stiffness_of(c), np.array([0.01, 0.0, 0.02, 0.0, 0.0, 0.0])
+    pull = stiffness * (target_of(c, speed_z=0.02) - [*c.x, *c.turn])
+    np.testing.assert_allclose(pull - damping_of(c) * speed, c.wrench)
+
+
 def test_above_its_speed_the_skill_pushes_less() -> None:
     c = command(wrench=[0.0, 0.0, 15.0, 0.0, 0.0, 0.0], v=[0.0, 0.0, 0.02], drag=[0.0, 0.0, 300.0])
     assert target_of(c, 0.05)[2] < target_of(command(wrench=list(c.wrench)), 0.05)[2]
@@ -41,7 +54,7 @@ def test_above_its_speed_the_skill_pushes_less() -> None:
 
 def test_a_contact_has_the_labs_clip_and_the_locks_axes() -> None:
     contact = contact_of(command(), O_T_LOCK, bounds(), 3.0)
-    assert (contact.clip_m, contact.t_max_s, contact.damping_ratio) == (0.02, 3.0, 0.7)
+    assert (contact.clip_m, contact.t_max_s) == (0.02, 3.0)
     np.testing.assert_array_equal(contact.o_r_c, O_T_LOCK[:3, :3])
 
 

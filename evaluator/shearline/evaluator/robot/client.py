@@ -110,6 +110,10 @@ class Client(Protocol):
         """Set the controller's reference ``(4, 4)``."""
         ...
 
+    def tune(self, stiffness: Array, damping: Array) -> None:
+        """Change the gains ``(6,)`` along the axes of the compliance frame."""
+        ...
+
     def newest(self) -> Array | None:
         """Return the newest row of the running motion."""
         ...
@@ -244,16 +248,12 @@ def _left(rows: list[Array], drive: Drive) -> str:
 
 
 def base_gains(contact: Contact) -> tuple[Array, Array]:
-    """Return stiffness and damping ``(6, 6)`` in the base frame.
-
-    Damping is 2 zeta sqrt(K), as both libraries define it: without the arm's inertia.
-    """
+    """Return stiffness and damping ``(6, 6)`` in the base frame."""
     turn = np.zeros((6, 6))
     turn[:3, :3] = turn[3:, 3:] = contact.o_r_c
-    damping = 2.0 * contact.damping_ratio * np.sqrt(contact.stiffness)
     return (
         turn @ np.diag(contact.stiffness) @ turn.T,
-        turn @ np.diag(damping) @ turn.T,
+        turn @ np.diag(contact.damping) @ turn.T,
     )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -32,13 +33,16 @@ from shearline.evaluator.robot.client import (
 )
 from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotRefused, RobotUnreachable
 from shearline.evaluator.robot.franka import Franka
-from shearline.evaluator.robot.port import Array, Mode, Tool
+from shearline.evaluator.robot.port import Array, Contact, Mode, Tool
 
 #: A contact that ends by itself has this long to brake; within the port's grace [s].
 BRAKE_S = 0.02
 
-#: Gains are smoothed with this time constant [s]: there is nothing to smooth at a beginning.
-GAINS_S = 1e-3
+#: A contact that is asked to end has this long to brake, and may end sooner [s].
+FINISH_S = 0.2
+
+#: Gains are smoothed with this time constant [s].
+GAINS_S = 5e-3
 
 #: Stiffness that keeps the elbow where it was [N m/rad].
 POSTURE = 5.0
@@ -146,9 +150,7 @@ class FrankyClient:
             posture_task=franky.PostureTask(np.array(state.q), POSTURE),
             gains_time_constant=GAINS_S,
         )
-        gains = franky.CartesianImpedanceGains()
-        gains.stiffness, gains.damping = base_gains(contact)
-        motion.set_gains(gains)
+        motion.set_gains(_gains(franky, contact))
         motion.set_reference(franky.CartesianReference(target=state.O_T_EE))
         motion.register_callback(self._note)
         lasted = franky.Measure.REL_TIME
@@ -193,6 +195,14 @@ class FrankyClient:
         assert franky is not None
         self._motion.set_reference(franky.CartesianReference(target=franky.Affine(pose)))
 
+    def tune(self, stiffness: Array, damping: Array) -> None:
+        """Change the gains."""
+        franky, drive = self._franky, self._drive
+        if franky is None or drive is None:
+            return
+        contact = replace(drive.contact, stiffness=stiffness, damping=damping)
+        self._motion.set_gains(_gains(franky, contact))
+
     def newest(self) -> Array | None:
         """Return the newest row of the motion."""
         with self._lock:
@@ -216,7 +226,7 @@ class FrankyClient:
         if not self.running():
             return
         try:
-            self._robot.move(self._stop_motion(0.5), asynchronous=True)
+            self._robot.move(self._stop_motion(FINISH_S), asynchronous=True)
         except Exception as error:  # noqa: BLE001 - it ended just now, and franky says it only once
             self._failed = error
 
@@ -294,6 +304,12 @@ def clip_in_base(o_r_c: Array) -> float:
     frame is then the largest row sum of its rotation times the clip; 1 where the axes agree.
     """
     return 1.0 / float(np.abs(o_r_c.T).sum(axis=1).max())
+
+
+def _gains(franky: ModuleType, contact: Contact) -> Any:
+    gains = franky.CartesianImpedanceGains()
+    gains.stiffness, gains.damping = base_gains(contact)
+    return gains
 
 
 def _forced(franky: ModuleType, drive: Drive) -> Any:

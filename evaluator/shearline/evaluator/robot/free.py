@@ -12,6 +12,7 @@ from shearline.evaluator.robot.port import Array, Contact, Guard, Sample
 
 #: Stiffness of free motions [N/m, N m/rad] and the error that pulls at most [m, rad].
 STIFFNESS = np.array([2000.0] * 3 + [100.0] * 3)
+DAMPING = 2.0 * np.sqrt(STIFFNESS)
 CLIP_M, CLIP_RAD = 0.02, 0.2
 
 #: A free motion has arrived within these [m, rad], at this speed of the joints [rad/s].
@@ -29,7 +30,7 @@ def free_motion(start: Array, goal: Array, speed_mps: float, guard: Guard) -> tu
     most_radps = clip_rad * math.sqrt(STIFFNESS[3]) / 3.0
     line = Line(start, goal, min(speed_mps, most_mps), most_radps)
     t_max_s = 2.0 * line.length_s + 5.0
-    return line, Contact(np.eye(3), STIFFNESS, 1.0, clip_m, clip_rad, t_max_s)
+    return line, Contact(np.eye(3), STIFFNESS, DAMPING, clip_m, clip_rad, t_max_s)
 
 
 def free_clips(guard: Guard) -> tuple[float, float]:

@@ -17,11 +17,13 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import os
 import signal
 import socket
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -94,6 +96,7 @@ class PandaClient:
         self._library: ModuleType | None = None
         self._panda: Any = None
         self._controller: Any = None
+        self._contact: Any = None
         self._rows: list[Array] = []
         self._newest: Array | None = None
         self._target, self._posture = np.eye(4), np.zeros(JOINTS)
@@ -171,14 +174,13 @@ class PandaClient:
         if mode is not Mode.IDLE:
             raise ended(f"the robot is {mode}")
         assert self._library is not None
-        gains = diagonal(base_gains(drive.contact)[0])
-        gains[3:] *= 2.0  # the library takes half of small angles for the error
         self._controller = self._library.controllers.CartesianImpedance(
-            impedance=np.diag(gains),
-            damping_ratio=drive.contact.damping_ratio,
+            impedance=impedance_of(drive.contact),
+            damping_ratio=ratio_of(drive.contact),
             nullspace_stiffness=POSTURE,
             filter_coeff=1.0,
         )
+        self._contact = drive.contact
         self._posture = np.array(state.q)
         self._target = _matrix(state.O_T_EE)
         self._asked, self._how, self._newest = False, None, None
@@ -191,10 +193,12 @@ class PandaClient:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             self._over.set()
             raise ended(str(error)) from error
-        threading.Thread(target=self._tend, args=(drive,), daemon=True, name="panda-tend").start()
+        threading.Thread(
+            target=self._tend, args=(self._panda, drive), daemon=True, name="panda-tend"
+        ).start()
 
-    def _tend(self, drive: Drive) -> None:
-        """Look after a contact until it is over."""
+    def _tend(self, panda: Any, drive: Drive) -> None:
+        """Look after a contact until it is over, also one that is let go of."""
         rows: list[Array] = []
         try:
             while not self._asked and self._how is None:
@@ -204,14 +208,14 @@ class PandaClient:
                     self._how = self._judge(rows, drive)
                     if self._how is None:
                         self._send(drive.contact, row)
-                self._panda.raise_error()
+                panda.raise_error()
                 time.sleep(LOOK_S)
-            self._settle()
+            self._settle(panda)
         except RuntimeError as error:
             self._how = ended(str(error))
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
-            self._leave()
+            self._leave(panda)
 
     def _judge(self, rows: list[Array], drive: Drive) -> MotionEnded | None:
         """Return why the contact is to end now, if it is, and set the kernel's timer."""
@@ -227,7 +231,7 @@ class PandaClient:
         pose = clipped(self._target, row[POSE].reshape(4, 4), contact)
         self._controller.set_control(pose[:3, 3], quaternion(pose[:3, :3]), self._posture)
 
-    def _settle(self) -> None:
+    def _settle(self, panda: Any) -> None:
         """Aim at where the arm is for a moment, so that it is left at rest."""
         row = self.newest()
         if row is not None and np.isfinite(row[POSE]).all():
@@ -236,23 +240,33 @@ class PandaClient:
             begun = self._controller.get_time()
             deadline = time.monotonic() + END_S
             while self._controller.get_time() < begun + BRAKE_S and time.monotonic() < deadline:
-                self._panda.raise_error()
+                panda.raise_error()
                 time.sleep(1e-3)
 
-    def _leave(self) -> None:
+    def _leave(self, panda: Any) -> None:
         """Leave the motion and take the library's log."""
         try:
-            self._panda.stop_controller()
-            self._panda.raise_error()
+            panda.stop_controller()
+            panda.raise_error()
         except RuntimeError as error:
             self._how = self._how or ended(str(error))
-        self._rows += _log(self._panda.get_log())
-        self._panda.disable_logging()
+        self._rows += _log(panda.get_log())
+        panda.disable_logging()
         self._over.set()
 
     def aim(self, pose: Array) -> None:
-        """Set the target; it is sent, within the clip, at the next look."""
+        """Set the target; it is sent, within the clip, at once and again at each look."""
         self._target = np.array(pose)
+        row = self._newest
+        ends = self._asked or self._how is not None
+        if row is not None and not ends and np.isfinite(row[POSE]).all():
+            self._send(self._contact, row)
+
+    def tune(self, stiffness: Array, damping: Array) -> None:
+        """Change the gains; the clip of the contact stays."""
+        contact = replace(self._contact, stiffness=stiffness, damping=damping)
+        self._controller.set_impedance(impedance_of(contact))
+        self._controller.set_damping_ratio(ratio_of(contact))
 
     def newest(self) -> Array | None:
         """Return the newest row of the motion.
@@ -260,9 +274,10 @@ class PandaClient:
         While the library leaves its controller it neither feeds its copy of the state nor lets it
         be read; the row before stays the newest then.
         """
-        if self._controller.get_time() > 0.0:
+        panda = self._panda
+        if panda is not None and self._controller.get_time() > 0.0:
             with contextlib.suppress(RuntimeError):
-                self._newest = _row(self._panda.get_state())
+                self._newest = _row(panda.get_state())
         return self._newest
 
     def running(self) -> bool:
@@ -297,6 +312,21 @@ class PandaClient:
         """Return the rows of all motions that are over."""
         rows, self._rows = self._rows, []
         return rows
+
+
+def ratio_of(contact: Contact) -> float:
+    """Return the damping ratio that the library takes for all axes: that of the third.
+
+    Its damping is 2 ratio sqrt(K), without the arm's inertia.
+    """
+    return float(contact.damping[2] / (2.0 * math.sqrt(contact.stiffness[2])))
+
+
+def impedance_of(contact: Contact) -> Array:
+    """Return the stiffness ``(6, 6)`` that the library takes for a contact's."""
+    gains = diagonal(base_gains(contact)[0])
+    gains[3:] *= 2.0  # the library takes half of small angles for the error
+    return np.diag(gains)
 
 
 def diagonal(stiffness: Array) -> Array:

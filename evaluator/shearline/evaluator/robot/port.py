@@ -123,7 +123,8 @@ class Contact:
         o_r_c: Orientation of the compliance frame in the base frame ``(3, 3)``: its axes are
             those of ``stiffness``.
         stiffness: Translations [N/m], then rotations [N m/rad] ``(6,)``.
-        damping_ratio: Of every axis, 1 is critical.
+        damping: Translations [N s/m], then rotations [N m s/rad] ``(6,)``. Along the third axis,
+            the one that is pushed along, an arm may brake more but never less.
         clip_m: Largest position error that pulls, each axis of the compliance frame [m].
         clip_rad: Largest rotation error that pulls, each axis [rad].
         t_max_s: The port ends this contact by itself after so much of the robot's time [s].
@@ -131,7 +132,7 @@ class Contact:
 
     o_r_c: Array
     stiffness: Array
-    damping_ratio: float
+    damping: Array
     clip_m: float
     clip_rad: float
     t_max_s: float
@@ -164,6 +165,14 @@ class ContactSession(Protocol):
 
         Raises:
             MotionEnded: If the contact is over; also the first sign of it.
+        """
+        ...
+
+    def gains(self, stiffness: Array, damping: Array) -> None:
+        """Go on with other gains, both ``(6,)`` as in :class:`Contact`; returns at once.
+
+        Raises:
+            MotionEnded: As :meth:`ref`.
         """
         ...
 

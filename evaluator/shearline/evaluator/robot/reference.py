@@ -1,8 +1,8 @@
 """The control layer on a robot: a command of the skill as a reference of its impedance controller.
 
 The robot knows F = K clip(x_ref - x) - D v and no feed-forward wrench, so that a push or wiggle F
-becomes a virtual displacement F / K: at rest the same force, exactly, as long as it is within the
-clip. References move no faster than the lab allows, because a step of the reference is a blow.
+becomes a virtual displacement (F + D v) / K: the same force, as long as it is within the clip.
+References move no faster than the lab allows, because a step of the reference is a blow.
 Everything is in the frame of the believed lock.
 """
 
@@ -13,7 +13,12 @@ import numpy as np
 from shearline.evaluator.robot.bounds import Bounds
 from shearline.evaluator.robot.frames import in_lock
 from shearline.evaluator.robot.port import Array, Contact
+from shearline.evaluator.skill.control import DESIGN_MASS
 from shearline.evaluator.skill.manipulation import AXIAL_K, Command
+
+#: What the damping is designed for: the simulation's masses, but a unit along the axis, where the
+#: reference has to lead by what the damping takes off [kg, kg m^2].
+MASS = np.array([*DESIGN_MASS[:2], 1.0, *DESIGN_MASS[3:]])
 
 
 def stiffness_of(c: Command) -> Array:
@@ -26,13 +31,19 @@ def stiffness_of(c: Command) -> Array:
     return held
 
 
+def damping_of(c: Command) -> Array:
+    """Return the damping ``(6,)`` that the robot is to hold a command with."""
+    damping: Array = 2.0 * c.ratio[0] * np.sqrt(stiffness_of(c) * MASS)
+    return damping
+
+
 def contact_of(c: Command, o_t_lock: Array, bounds: Bounds, t_max_s: float) -> Contact:
     """Return the stretch of impedance control that carries a command out."""
     limits = bounds.contact
     return Contact(
         o_r_c=o_t_lock[:3, :3].copy(),
         stiffness=stiffness_of(c),
-        damping_ratio=float(c.ratio[0]),
+        damping=damping_of(c),
         clip_m=limits.clip_m,
         clip_rad=limits.clip_rad,
         t_max_s=t_max_s,
@@ -42,13 +53,22 @@ def contact_of(c: Command, o_t_lock: Array, bounds: Bounds, t_max_s: float) -> C
 def target_of(c: Command, speed_z: float) -> Array:
     """Return where a command's reference would be without limits ``(6,)`` [m, rad].
 
+    The robot brakes all motion, the skill only what differs from its own. So the reference leads by
+    what the robot will take off: at the speed that is wanted, or, along an axis that is left to a
+    force alone, at the speed that there is. Beyond the skill's own speed the robot's brake stays,
+    for it acts at once.
+
     Args:
         c: The command.
         speed_z: Speed of the tip along the axis [m/s]; the skill brakes above its own.
     """
-    wrench = c.wrench.copy()
-    wrench[2] += c.drag[2] * (c.v[2] - speed_z)
-    target: Array = np.concatenate([c.x, c.turn]) + wrench / stiffness_of(c)
+    stiffness, speed = stiffness_of(c), np.concatenate([c.v, c.w])
+    if c.stiffness[2] == 0.0:
+        speed[2] = min(speed_z, c.v[2])
+    damping = damping_of(c)
+    wrench = c.wrench + damping * speed
+    wrench[2] += max(c.drag[2] - damping[2], 0.0) * (c.v[2] - speed_z)
+    target: Array = np.concatenate([c.x, c.turn]) + wrench / stiffness
     return target
 
 

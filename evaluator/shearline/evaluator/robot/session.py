@@ -52,6 +52,14 @@ class Session:
             self._raise()
         self._client.aim(o_t_ee)
 
+    def gains(self, stiffness: Array, damping: Array) -> None:
+        """Change the gains."""
+        if not self._port.is_current(self):
+            raise MotionEnded(Ending.STOPPED, "another contact has begun")
+        if self.over or not self._client.running():
+            self._raise()
+        self._client.tune(stiffness, damping)
+
     def end(self) -> None:
         """Come to rest and leave the motion."""
         if self.over or not self._port.is_current(self):

@@ -18,6 +18,7 @@ the emergency stop in your hand, and it may run against hardware. It is no safet
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -80,7 +81,7 @@ class RobotPortContract(ABC):
         facts: dict[str, object] = {
             "o_r_c": sample.o_t_ee[:3, :3].copy(),
             "stiffness": np.array([800.0] * 3 + [40.0] * 3),
-            "damping_ratio": 1.0,
+            "damping": np.array([60.0] * 3 + [13.0] * 3),
             "clip_m": 0.02,
             "clip_rad": 0.05,
             "t_max_s": 2.0,
@@ -214,6 +215,19 @@ class RobotPortContract(ABC):
         start = port.sample().o_t_ee.copy()
         after = self.lift(port, REACH_M / 2)
         assert after.o_t_ee[2, 3] - start[2, 3] == pytest.approx(REACH_M / 2, abs=1.5e-3)
+
+    def test_a_contact_goes_on_with_other_gains(self, port: RobotPort) -> None:
+        """Softer and stiffer again, and the tip stays."""
+        sample = port.sample()
+        contact = self.contact(sample)
+        session, watch = port.contact(contact), Watch(port)
+        last = watch.look()
+        for share in (0.5, 1.0):
+            session.gains(share * contact.stiffness, math.sqrt(share) * contact.damping)
+            last = watch.until(last.t_s + 0.1)
+        assert last.mode is Mode.MOVE
+        session.end()
+        assert apart(sample.o_t_ee, last.o_t_ee)[0] < 2e-3
 
     def test_a_contact_ends_by_itself_when_its_time_is_up(self, port: RobotPort) -> None:
         """The watchdog of a skill that hangs: nobody calls ``end``."""

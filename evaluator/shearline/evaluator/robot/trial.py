@@ -7,6 +7,7 @@ and reports; it decides neither whether it may nor what becomes of the key after
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,7 +16,13 @@ from shearline.evaluator.robot.bounds import Bounds
 from shearline.evaluator.robot.errors import Ending, MotionEnded
 from shearline.evaluator.robot.frames import apart, in_lock
 from shearline.evaluator.robot.port import Array, ContactSession, RobotPort
-from shearline.evaluator.robot.reference import Reference, contact_of, stiffness_of, target_of
+from shearline.evaluator.robot.reference import (
+    Reference,
+    contact_of,
+    damping_of,
+    stiffness_of,
+    target_of,
+)
 from shearline.evaluator.robot.sight import Sight, View
 from shearline.evaluator.robot.watch import Watch
 from shearline.evaluator.skill import semantic
@@ -26,8 +33,11 @@ from shearline.evaluator.skill.semantic import Decision, Limits
 #: Python may be away from a contact for so long before the trial is no measurement any more [s].
 LATE_S_MAX = 0.25
 
-#: Joint torques beyond this share of the guard when it ended a contact: it was the torque.
-GUARD_SHARE = 0.9
+#: A tick may be this early by the robot's clock, which counts milliseconds in fractions [s].
+EARLY_S = 5e-4
+
+#: Slower than this share of the guard's speed, it ended a contact for force or torque.
+SPEED_SHARE = 0.8
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +154,7 @@ class Insertion:
         self._sight = Sight(work.o_t_lock)
         self._command = empty_command()
         self._reference = Reference(work.bounds, work.pace)
+        self._due_s = 0.0
 
     def approach(self) -> None:
         """Go to where the skill's own approach ends, in free space.
@@ -168,28 +179,24 @@ class Insertion:
             MotionEnded: If no verdict was reached.
             Halted: If the trial is to end; the contact has been ended.
         """
-        view = self._sight.view(self._watch.look())
-        begin_s = view.t_s
-        self._step(view, 1)
-        while self._report.end.verdict == semantic.OPEN:
-            t_max_s = self._work.bounds.contact.trial_s - (view.t_s - begin_s)
-            if t_max_s <= 0.0:
-                raise MotionEnded(Ending.TIME, "the trial took longer than contact.trial_s")
-            view = self._stretch(view, t_max_s)
-        self._report.clipped = self._reference.clipped_share
-
-    def _stretch(self, view: View, t_max_s: float) -> View:
-        """Run one contact: as long as the stiffness that the skill asks for stays the same."""
         c, work, report = self._command, self._work, self._report
-        stiffness, before_s = stiffness_of(c), view.t_s
+        view = self._sight.view(self._watch.look())
+        self._due_s = view.t_s
+        self._step(view, self._ticks(view))
+        stiffness = stiffness_of(c)
         with self._watch.blocked():
-            session = self._port.contact(contact_of(c, work.o_t_lock, work.bounds, t_max_s))
+            session = self._port.contact(
+                contact_of(c, work.o_t_lock, work.bounds, work.bounds.contact.trial_s)
+            )
         view = self._sight.view(self._watch.look())
         report.begun(view.t_s)
+        self._due_s = view.t_s  # the skill's clock stands while the robot gets ready
         self._reference.begin(view.tip, view.turn)
-        self._step(view, self._ticks(view.t_s - before_s))
         try:
-            while report.end.verdict == semantic.OPEN and _same(stiffness_of(c), stiffness):
+            while report.end.verdict == semantic.OPEN:
+                if not np.array_equal(stiffness_of(c), stiffness):
+                    stiffness = stiffness_of(c)
+                    session.gains(stiffness, damping_of(c))
                 view = self._tick(session, view)
             with self._watch.blocked():
                 session.end()
@@ -197,9 +204,9 @@ class Insertion:
         except MotionEnded as ended:
             self._judge(ended, view)
         finally:
+            report.clipped = self._reference.clipped_share
             with self._watch.blocked():
                 _let_go(session)
-        return view
 
     def _tick(self, session: ContactSession, view: View) -> View:
         work = self._work
@@ -207,8 +214,8 @@ class Insertion:
         self._reference.toward(target, view.tip, view.turn, work.tick_s)
         session.ref(self._reference.pose(work.o_t_lock))
         self._report.ran_until(view.t_s)
-        after = self._sight.view(self._watch.until(view.t_s + work.tick_s))
-        ticks = self._ticks(after.t_s - view.t_s)
+        after = self._sight.view(self._watch.until(self._due_s - EARLY_S))
+        ticks = self._ticks(after)
         if ticks * work.tick_s > LATE_S_MAX:
             away_s = ticks * work.tick_s
             raise MotionEnded(
@@ -218,8 +225,15 @@ class Insertion:
         self._step(after, ticks)
         return after
 
-    def _ticks(self, span_s: float) -> int:
-        return max(1, round(span_s / self._work.tick_s))
+    def _ticks(self, view: View) -> int:
+        """Return how many ticks are due at a view, and count them as done.
+
+        They keep to the robot's clock from the first on, so that lateness never adds up.
+        """
+        tick_s = self._work.tick_s
+        ticks = max(0, math.floor((view.t_s - self._due_s + EARLY_S) / tick_s) + 1)
+        self._due_s += ticks * tick_s
+        return ticks
 
     def _step(self, view: View, ticks: int) -> None:
         """Run the upper layers for ``ticks``, all with what is seen now, and note the last."""
@@ -238,23 +252,32 @@ class Insertion:
         )
 
     def _judge(self, ended: MotionEnded, view: View) -> None:
-        """The guard is ahead of the semantic layer: what it stopped for torque is that verdict."""
-        if ended.ending is not Ending.GUARD or self._report.end.verdict != semantic.OPEN:
-            raise ended
-        newest = self._sight.view(self._port.sample())
-        felt = np.maximum(np.abs(newest.tau_ext), np.abs(view.tau_ext))
-        guard = self._work.bounds.port_guard()
-        force = max(np.linalg.norm(v.wrench[:3]) for v in (newest, view))
-        if not ((felt > GUARD_SHARE * guard.tau_ext_max).any() or force > guard.force_max_n * 0.5):
+        """The guard is ahead of the semantic layer: what it stopped for force is that verdict.
+
+        A verdict that there is already stands: behind it a key may meet the bottom of the lock.
+        """
+        if ended.ending is not Ending.GUARD:
             raise ended
         d = self._report.end
+        if d.verdict != semantic.OPEN:
+            return
+        if self._strayed(view):
+            raise ended
         self._report.end = Decision(
             semantic.EXTRACTION, 0, d.search_ticks, d.clock_ticks, semantic.TORQUE, view.tip[2]
         )
 
-
-def _same(one: Array, other: Array) -> bool:
-    return bool(np.array_equal(one, other))
+    def _strayed(self, view: View) -> bool:
+        """Whether the guard may have ended a contact for box or speed; a blow is soon over."""
+        guard, newest = self._work.bounds.port_guard(), self._port.sample()
+        low, high = guard.box_m
+        at = newest.o_t_ee[:3, 3]
+        after = self._sight.view(newest)
+        moved_m = float(np.linalg.norm(after.tip - view.tip))
+        speed = max(abs(view.speed_z), moved_m / max(after.t_s - view.t_s, 1e-3))
+        return bool(
+            (at < low).any() or (at > high).any() or speed > SPEED_SHARE * guard.speed_max_mps
+        )
 
 
 def _let_go(session: ContactSession) -> None:
