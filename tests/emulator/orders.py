@@ -7,6 +7,7 @@ pace wall
 patience S            how long lockstep waits for an answer before the client counts as gone
 press | release       the stop button
 startle               a reflex, as after a collision
+desk                  errors are cleared in the robot's own interface
 lose N                the next N states do not arrive
 drop                  the TCP connection ends
 freeze | thaw         the robot's clock stands, states go on arriving
@@ -124,6 +125,7 @@ _ORDERS: dict[str, Callable[..., None]] = {
     "press": Server.press,
     "release": lambda server: server.robot.release(),
     "startle": Server.startle,
+    "desk": lambda server: server.robot.recover(),
     "lose": _lose,
     "drop": Server.disconnect,
     "freeze": _lie("frozen", value=True),
