@@ -147,7 +147,7 @@ def _headless() -> Iterator[ViewerClient]:
         ) from error
     try:
         yield client
-    except RuntimeError as error:  # Rerun's, when the viewer has gone
+    except (RuntimeError, ConnectionError) as error:  # Rerun's, when the viewer has gone
         raise RecordError(
             "the viewer ended before its picture was taken: it needs a graphics driver, a software"
             f" one will do: {error}"
