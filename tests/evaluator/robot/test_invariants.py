@@ -112,9 +112,20 @@ FAULTS: dict[str, Callable[[Cell, Emulator], object]] = {
 }
 
 
+def spooled(kind: Kind, fault: str) -> set[int]:
+    """Return how many results the arm's process may leave: one, unless it is gone before.
+
+    Then the worker alone says what became of the attempt. At a NaN the Panda's library throws in a
+    thread of its own, which ends the process before or after the arm has answered.
+    """
+    if fault.startswith("SIG"):
+        return {0}
+    return {0, 1} if (kind.version, fault) == (5, "nan") else {1}
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 def test_after_a_fault_nothing_moves_before_the_operator_acts_and_one_result_is_aborted(
-    cell: Make, robot: Emulator, fault: str
+    cell: Make, robot: Emulator, kind: Kind, fault: str
 ) -> None:
     with cell() as armed:
         armed.armed()
@@ -128,7 +139,7 @@ def test_after_a_fault_nothing_moves_before_the_operator_acts_and_one_result_is_
         assert not armed.ready.is_set()
         results = [r for r in armed.spooled() if r.trial == 0]
         assert all(r.kind is OutcomeKind.ABORTED for r in results)
-        assert len(results) == (0 if fault.startswith("SIG") else 1)
+        assert len(results) in spooled(kind, fault)
         assert armed.in_contact()
     robot.order("thaw")
 
