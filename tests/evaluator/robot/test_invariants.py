@@ -271,6 +271,7 @@ def test_a_stopped_trial_leaves_its_whole_log(cell: Make, robot: Emulator) -> No
         np.testing.assert_allclose(np.diff(t_s[-100:]), 1e-3, atol=1e-6)
 
 
+@pytest.mark.long
 def test_twenty_trials_lose_no_cycle(cell: Make, robot: Emulator) -> None:
     robot.order("pace lockstep 1")
     with cell() as armed:
