@@ -40,7 +40,7 @@ def alone(
         },
     )
     asked = []
-    with fitting():
+    with fitting("cma"):
         for k in range(batches):
             if k:
                 rng = next(rngs)

@@ -26,6 +26,8 @@ from shearline.learner.switches import check, having, plain
 from shearline.learner.threads import fitting
 from shearline.protocol.space import Space
 
+#: What a generation needs.
+LIBRARIES = ("cma",)
 #: Fewest solutions of a generation: below, the package would need mirrored ones.
 POPULATION_MIN = 4
 #: The package has no one-dimensional search: a second coordinate is added there, and ignored.
@@ -97,7 +99,7 @@ class CMAES(EpisodicLearner):
     """
 
     name = "cmaes"
-    fits = True
+    libraries = LIBRARIES
 
     def __init__(
         self, space: Space, episode_length: int = 20, seed: int = 0, **switches: object
@@ -112,7 +114,7 @@ class CMAES(EpisodicLearner):
 
     def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
         self._normal = rng
-        with fitting(), warnings.catch_warnings():
+        with fitting(*LIBRARIES), warnings.catch_warnings():
             # It warns of generations larger than it was set for, which it handles: the weights
             # then go to the best and the worst.
             warnings.simplefilter("ignore")
@@ -172,7 +174,7 @@ class CMAES(EpisodicLearner):
             return super()._focus(trials)
         ahead = copy.deepcopy(self._strategy)
         begun = -(-self._ledger.asked // self.episode_length)
-        with fitting(), warnings.catch_warnings():
+        with fitting(*LIBRARIES), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             self._tell_waiting(ahead, begun, trials)
         n = len(self.space)

@@ -39,8 +39,8 @@ class EpisodicLearner(ABC):
     #: Name under which :func:`shearline.learner.create` knows it.
     name: str
 
-    #: Whether renewing the model is a fit, for which libraries are loaded that take a second.
-    fits = False
+    #: Modules that renewing the model needs and that take up to a second to load.
+    libraries: tuple[str, ...] = ()
 
     #: Whether it can start from the trials of another run; its model must then take any trials.
     primes = False
@@ -112,8 +112,7 @@ class EpisodicLearner(ABC):
 
     def warm(self) -> None:
         """Load what the first fit needs; for whoever has time before it. By default nothing."""
-        if self.fits:
-            load()
+        load(*self.libraries)
 
     def snapshot(self) -> Mapping[str, object]:
         """Return the model as plain numbers, strings, lists and dicts.

@@ -26,6 +26,9 @@ from shearline.learner.switches import check, having, plain
 from shearline.learner.threads import fitting
 from shearline.protocol.space import Space
 
+#: What a renewal needs.
+LIBRARIES = ("scipy.optimize",)
+
 #: Bounds of the multiplier eta; rewards are scaled to a span of 1 before they are divided by it.
 ETA_MIN, ETA_MAX = 1e-4, 1e4
 #: Bound of the multiplier xi of the entropy constraint.
@@ -102,7 +105,7 @@ class HiREPS(EpisodicLearner):
     """
 
     name = "hireps"
-    fits = True
+    libraries = LIBRARIES
 
     def __init__(
         self, space: Space, episode_length: int = 20, seed: int = 0, **switches: object
@@ -125,7 +128,7 @@ class HiREPS(EpisodicLearner):
         """Return the next policy; the present one learns from episodes k - H to k."""
         oldest = max(0, len(self._policies) - 1 - self.config.history)
         recent = trials.where(trials.number >= oldest * self.episode_length)
-        with fitting():
+        with fitting(*LIBRARIES):
             return renew(self._policies[oldest:], recent, self.config)
 
     def _focus(self, trials: Trials) -> Focus:

@@ -27,7 +27,7 @@ REALLY_GOOD = np.sum((ELSEWHERE - 0.4) ** 2, axis=1) < 0.15
 
 
 def fitted(kind: Partitioner, *, balanced: bool = False, seed: int = 0) -> Partition:
-    with fitting():
+    with fitting("sklearn.svm"):
         found = fit_partition(U, GOOD, PSPConfig(partition=kind, balanced=balanced), seed)
     assert found is not None
     return found
@@ -90,7 +90,7 @@ def test_there_is_nothing_to_part_while_all_labels_agree(
 
 @pytest.mark.parametrize("size", [2, 3])
 def test_two_samples_are_enough(kind: Partitioner, size: int) -> None:
-    with fitting():
+    with fitting("sklearn.svm"):
         found = fit_partition(U[:size], np.arange(size) == 0, PSPConfig(partition=kind))
     assert found is not None
     assert np.isfinite(found.decision(ELSEWHERE)).all()
@@ -98,7 +98,7 @@ def test_two_samples_are_enough(kind: Partitioner, size: int) -> None:
 
 def test_contradicting_duplicates_are_parted_somehow(kind: Partitioner) -> None:
     u, good = np.concatenate([U, U]), np.concatenate([GOOD, ~GOOD])
-    with fitting():
+    with fitting("sklearn.svm"):
         found = fit_partition(u, good, PSPConfig(partition=kind, svm_c=1e8))
     assert found is not None
     assert np.isfinite(found.decision(u)).all()
@@ -129,7 +129,7 @@ def test_the_network_decides_as_the_library_does() -> None:
         max_iter=STEPS_MAX,
         random_state=3,
     )
-    with fitting():
+    with fitting("sklearn.svm"):
         chance = network.fit(centred(U), GOOD).predict_proba(centred(ELSEWHERE))[:, 1]
         ours = fit_network(U, GOOD, 3, balanced=False).decision(ELSEWHERE)
     np.testing.assert_allclose(1.0 / (1.0 + np.exp(-ours)), chance, atol=1e-9)

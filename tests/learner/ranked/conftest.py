@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 import pytest
 
+from shearline.learner.ranked.model import LIBRARIES
 from shearline.learner.threads import fitting
 
 
 @pytest.fixture(autouse=True)
 def one_thread() -> Iterator[None]:
-    with fitting():
+    with fitting(*LIBRARIES):
         yield

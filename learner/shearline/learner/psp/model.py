@@ -19,6 +19,9 @@ from shearline.learner.psp.proposal import Mixture, fit_mixture
 from shearline.learner.psp.reward import UNBOUNDED, expected, update
 from shearline.learner.threads import fitting
 
+#: What a fit needs.
+LIBRARIES = ("sklearn.mixture", "sklearn.svm")
+
 
 @dataclass(frozen=True, slots=True)
 class Model:
@@ -57,7 +60,7 @@ def renew(model: Model, trials: Trials, seed: int, config: PSPConfig) -> Model:
     wins = int(judged.success.sum())
     mixture, components, partition = model.mixture, model.components, model.partition
     if wins >= min(config.proposal_min, config.filter_min):
-        with fitting():
+        with fitting(*LIBRARIES):
             if wins >= config.proposal_min:
                 samples = mixture_samples(judged, good, config)
                 mixture, components = fit_mixture(samples, components, seed, config)

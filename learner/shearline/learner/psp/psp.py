@@ -14,7 +14,7 @@ from shearline.learner.ledger import Trials
 from shearline.learner.lhs import latin_hypercube
 from shearline.learner.psp.config import Exhausted, PSPConfig
 from shearline.learner.psp.focus import component_focus
-from shearline.learner.psp.model import Model, renew
+from shearline.learner.psp.model import LIBRARIES, Model, renew
 from shearline.learner.psp.partition import Partition
 from shearline.learner.psp.proposal import draw_inside
 from shearline.learner.psp.reward import rewards
@@ -37,7 +37,7 @@ class PSP(EpisodicLearner):
         name: Name it was created under.
     """
 
-    fits = True
+    libraries = LIBRARIES
     primes = True
 
     def __init__(

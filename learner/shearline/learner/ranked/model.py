@@ -21,6 +21,9 @@ from shearline.learner.ranked.score import failure_price, score
 from shearline.learner.ranked.window import window
 from shearline.learner.threads import fitting
 
+#: What a fit needs.
+LIBRARIES = ("scipy.linalg.lapack", "scipy.optimize")
+
 #: Least length that counts as one step when trials are looked for, in edges of the cube.
 STEP_MIN = 1e-3
 #: Draws by which the middle is moved, and how many of them it moves to.
@@ -109,7 +112,7 @@ def fit_model(
     step = np.maximum(stand.deviation, STEP_MIN)
     seen = window(trials, stand.centre, step, config.window)
     won = window(trials.where(trials.success), stand.centre, step, config.cost_window)
-    with fitting():
+    with fitting(*LIBRARIES):
         return _fit(seen, won, episode_length, config)
 
 

@@ -13,7 +13,7 @@ from shearline.learner.ledger import Trials
 from shearline.learner.lhs import latin_hypercube
 from shearline.learner.ranked.config import RankedConfig
 from shearline.learner.ranked.elite import Elite
-from shearline.learner.ranked.model import Model, fit_model
+from shearline.learner.ranked.model import LIBRARIES, Model, fit_model
 from shearline.learner.recommend import Focus
 from shearline.learner.region import fold
 from shearline.protocol.space import Space
@@ -33,7 +33,7 @@ class RankedPSP(EpisodicLearner):
     """
 
     name = "psp-ranked"
-    fits = True
+    libraries = LIBRARIES
     primes = True
 
     def __init__(self, space: Space, episode_length: int, seed: int, config: RankedConfig) -> None:
