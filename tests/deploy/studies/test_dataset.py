@@ -19,8 +19,10 @@ from shearline.deploy.studies.dataset import CODE, Gathering, Size, Wanted
 from shearline.deploy.studies.lanes import Effort, Lanes, is_complete
 from shearline.deploy.studies.trials_of import ran
 from shearline.evaluator.builtin import builtin_spec
+from shearline.learner.dispatcher.entries import ResultTaken
 from shearline.learner.registry import create
 from shearline.learner.run.config import to_toml
+from shearline.learner.run.journal import read
 from shearline.protocol.errors import ConfigError, RecordError
 from shearline.protocol.messages import Purpose
 from shearline.protocol.space import Space
@@ -138,6 +140,22 @@ def test_a_learner_and_an_evaluator_that_are_killed_are_started_again(tmp_path: 
     assert lanes.run().runs == 1
     killed.join()
     assert ran(folder).outcomes(Purpose.LEARNING).trials == 40
+
+
+@pytest.mark.slow
+def test_an_evaluator_without_a_run_joins_one_that_goes_on(tmp_path: Path) -> None:
+    folders = []
+    for trials in (5, 100):
+        one = replace(wanted(size=replace(SIZE, trials=trials)), task="sleep-20")
+        folders.append(one.folder(tmp_path, one.learning()))
+        folders[-1].mkdir(parents=True)
+        (folders[-1] / "run.toml").write_text(to_toml(one.learning()))
+    assert Lanes(tmp_path, folders, 2, "mujoco", lambda _: None).run().lanes == 2
+    ran_by = [
+        {e.evaluator for e in read(folder / "journal") if isinstance(e, ResultTaken)}
+        for folder in folders
+    ]
+    assert ran_by == [{"evaluator-0"}, {"evaluator-0", "evaluator-1"}]
 
 
 def kill_both(lanes: Lanes, folder: Path) -> None:

@@ -2,7 +2,8 @@
 
 A lane is one evaluator that stays, and one learner after another at its endpoint. One evaluator
 to a run keeps every evaluator busy: where two share a run, one waits at the end of each episode for
-the other's trial, and both for the learner. What a run learns does not depend on how many share it.
+the other's trial, and both for the learner. Once no run is left to begin, idle evaluators join one
+that goes on. What a run learns does not depend on how many share it.
 """
 
 from __future__ import annotations
@@ -76,14 +77,27 @@ def is_complete(folder: Path) -> bool:
 
 @dataclass(slots=True)
 class _Lane:
-    """One endpoint, its evaluator, and the run that is led there."""
+    """One endpoint, its evaluator, and the run that is led there.
+
+    Attributes:
+        number: Of the lane.
+        listen: Endpoint of its learners.
+        serves: Endpoint that its evaluator connects to: its own, until nothing is left there.
+        evaluator: Its evaluator.
+        learner: Leads the run that goes on.
+        folder: Of that run.
+        restarts: How often a process of this run was started again.
+        spent_s: Processor time of evaluators that are gone [s].
+    """
 
     number: int
     listen: str
+    serves: str
     evaluator: Child | None = None
     learner: Child | None = None
     folder: Path | None = None
     restarts: int = 0
+    spent_s: float = 0.0
 
 
 @dataclass(slots=True)
@@ -116,14 +130,15 @@ class Lanes:
         began_s, began_cpu_s, waiting = time.monotonic(), _ended_cpu_s(), deque(self.folders)
         (self.study / LOGS).mkdir(parents=True, exist_ok=True)
         count = min(self.workers, len(self.folders))
-        self._lanes = [_Lane(number, free_endpoint()) for number in range(count)]
+        endpoints = [free_endpoint() for _ in range(count)]
+        self._lanes = [_Lane(number, own, own) for number, own in enumerate(endpoints)]
         try:
             while waiting or any(lane.folder for lane in self._lanes):
                 for lane in self._lanes:
                     self._look_after(lane, waiting)
                 time.sleep(LOOK_S / 4)
             wall_s = time.monotonic() - began_s
-            evaluators_cpu_s = sum(_cpu_s(lane.evaluator) for lane in self._lanes)
+            evaluators_cpu_s = sum(lane.spent_s + _cpu_s(lane.evaluator) for lane in self._lanes)
             processes.wait(self._leaving, patience_s=LEAVING_S)
         finally:
             processes.end(self.children(), patience_s=PATIENCE_S)
@@ -151,10 +166,21 @@ class Lanes:
         if lane.folder is None and waiting:
             lane.folder = waiting.popleft()
             lane.learner = _learner(lane, lane.folder)
+        elif lane.folder is None:
+            self._lend(lane)
+
+    def _lend(self, lane: _Lane) -> None:
+        """Have the evaluator of a lane that has no run left join one that goes on."""
+        busy = [other.listen for other in self._lanes if other.folder]
+        if busy and lane.serves not in busy and lane.evaluator is not None:
+            lane.spent_s += _cpu_s(lane.evaluator)
+            processes.end([lane.evaluator], patience_s=PATIENCE_S)
+            lane.serves = busy[0]
+            lane.evaluator = self._evaluator(lane)
 
     def _evaluator(self, lane: _Lane) -> Child:
         name = f"evaluator-{lane.number}"
-        arguments = ["--connect", reach(lane.listen), "--name", name, "--plant", self.plant]
+        arguments = ["--connect", reach(lane.serves), "--name", name, "--plant", self.plant]
         log = self.study / LOGS / f"{name}.out"
         return spawn_command(name, ["evaluator", *arguments, "--forever", "--no-traces"], log)
 
