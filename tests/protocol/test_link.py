@@ -1,5 +1,6 @@
 """Sessions: what they admit, how they fail, and that they always end."""
 
+import os
 import signal
 import socket
 import subprocess
@@ -55,6 +56,17 @@ def _listening() -> set[tuple[str, int]]:
 @pytest.mark.parametrize("path", link_module._COMMON)
 def test_every_common_setting_is_one_that_zenoh_has(path: str) -> None:
     zenoh.Config().get_json(path)
+
+
+def test_one_thread_receives_unless_the_environment_says_otherwise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("ZENOH_RUNTIME", raising=False)
+    open_router(free_endpoint()).close()
+    assert "rx: (worker_threads: 1)" in os.environ["ZENOH_RUNTIME"]
+    monkeypatch.setenv("ZENOH_RUNTIME", "(rx: (worker_threads: 3))")
+    open_router(free_endpoint()).close()
+    assert os.environ["ZENOH_RUNTIME"] == "(rx: (worker_threads: 3))"
 
 
 def test_a_setting_that_zenoh_does_not_have_is_refused() -> None:

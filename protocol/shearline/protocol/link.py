@@ -9,6 +9,7 @@ that use one are spawned.
 from __future__ import annotations
 
 import json
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -44,6 +45,10 @@ PUBLISHERS_MAX = 4 * SESSIONS_MAX
 #: Messages that wait in an intake before their senders are slowed down: more than evaluators ever
 #: have on their way honestly, and bounded memory whatever they send.
 INTAKE_MAX = 1024
+
+#: Threads of Zenoh: one receives, for all sessions of the process, and accepts besides. A second one
+#: only takes turns with it: either way all wait once an intake is full.
+_RUNTIME = "(rx: (worker_threads: 1), acc: (handover: rx))"
 
 #: Longest single attempt to connect, so that Ctrl-C and a deadline are noticed in between [s].
 _SLICE_S = 0.5
@@ -351,6 +356,7 @@ def _guard_exit() -> None:
 def _open(settings: Mapping[str, object]) -> zenoh.Session:
     import zenoh  # noqa: PLC0415 - as above
 
+    os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)  # read once, at a process's first session
     config = zenoh.Config()
     for path, value in {**_COMMON, **settings}.items():
         config.insert_json5(path, json.dumps(value))
