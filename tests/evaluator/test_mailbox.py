@@ -43,16 +43,14 @@ from shearline.evaluator.mail import (
     Tick,
 )
 from shearline.evaluator.mailbox import (
-    ANSWERED_MAX,
     FINISH_S,
     HANG_S,
     HELD_MAX,
     IDLE_LEASES,
     LEAVE_S,
-    RESEND_S_MAX,
-    RESEND_S_MIN,
     SILENCE_LEASES,
 )
+from shearline.evaluator.outbox import ANSWERED_MAX, RESEND_S_MAX, RESEND_S_MIN
 from shearline.protocol.codec import encode
 from shearline.protocol.messages import (
     Ack,
@@ -221,7 +219,7 @@ def test_what_a_flooding_peer_sends_is_bounded() -> None:
     for number in range(HELD_MAX):
         box.handle(Ended(result(number)), 0.0)
         box.handle(ack(number), 0.0)
-    assert len(box.answered) == ANSWERED_MAX
+    assert len(box.outbox.answered) == ANSWERED_MAX
 
 
 # -- hold ----------------------------------------------------------------------------------------

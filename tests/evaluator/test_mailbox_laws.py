@@ -120,7 +120,7 @@ class AnyStory(RuleBasedStateMachine):
 
     @invariant()
     def every_attempt_is_in_one_place(self) -> None:
-        places = [*self.box.held, *self.box.unacked, *self.box.answered]
+        places = [*self.box.held, *self.box.outbox.unacked, *self.box.outbox.answered]
         assert len(places) == len(set(places))
 
     @invariant()

@@ -8,7 +8,6 @@ the worker carry its instructions out.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass, field
 
 from msgspec.structs import replace
@@ -33,6 +32,7 @@ from shearline.evaluator.mail import (
     Settled,
     Started,
 )
+from shearline.evaluator.outbox import RESEND_S_MAX, RESEND_S_MIN, Outbox
 from shearline.protocol.messages import (
     Ack,
     Bye,
@@ -51,10 +51,6 @@ from shearline.protocol.messages import (
     clip,
 )
 
-#: A hello or result not answered is sent again after this long, then ever more slowly [s].
-RESEND_S_MIN = 0.25
-RESEND_S_MAX = 1.0
-
 #: Leases between renewals while a trial runs, and between signs of life while idle: who holds
 #: nothing delays nothing, and hundreds that wait for an update must not keep a core busy.
 RENEW_LEASES = 0.25
@@ -72,23 +68,13 @@ LEAVE_S = 1.0
 #: A trial loop that beats notices its deadline itself; one that did not by then is hung [s].
 HANG_S = 1.0
 
-#: Attempts held at once, whatever a peer sends; results remembered after they were acknowledged.
+#: Attempts held at once, whatever a peer sends.
 HELD_MAX = 1024
-ANSWERED_MAX = 4
 
 #: Longest wait for an event; only bounds how late a timer can be [s].
 WAIT_S_MAX = 0.5
 
 NEVER_S = float("inf")
-
-
-@dataclass(slots=True)
-class _Unacked:
-    """A result on its way."""
-
-    result: Result
-    due_s: float
-    delay_s: float = RESEND_S_MIN
 
 
 @dataclass(slots=True)
@@ -133,8 +119,7 @@ class Mailbox:
     welcomed: bool = False
     warm: bool = False
     held: dict[str, Trial] = field(default_factory=dict)
-    unacked: dict[str, _Unacked] = field(default_factory=dict)
-    answered: OrderedDict[str, Result] = field(default_factory=OrderedDict)
+    outbox: Outbox = field(default_factory=Outbox)
     running: _Running | None = None
     leaving: _Leaving | None = None
     over: bool = False
@@ -184,14 +169,13 @@ class Mailbox:
     def owe(self, results: list[Result]) -> None:
         """Take over results of earlier lives; they are sent until they are acknowledged."""
         for result in results:
-            mine = replace(result, boot=self.hello.boot)
-            self.unacked[result.token] = _Unacked(mine, due_s=0.0)
+            self.outbox.put(replace(result, boot=self.hello.boot), now_s=0.0)
 
     def wait_s(self, now_s: float) -> float:
         """Return how long nothing need be done [s], at most :data:`WAIT_S_MAX`."""
         due_s = [self._hello_s, self._life_s]
         if self.welcomed:
-            due_s += [unacked.due_s for unacked in self.unacked.values()]
+            due_s.append(self.outbox.next_s())
         if self.running is not None:
             due_s.append(self.running.overdue_s)
         if self.leaving is not None:
@@ -259,8 +243,7 @@ class Mailbox:
             self._out.append(Prepare(message.task))
         if not known:
             self._show_life(now_s)
-            for unacked in self.unacked.values():
-                unacked.due_s, unacked.delay_s = now_s, RESEND_S_MIN
+            self.outbox.all_again(now_s)
 
     def _open(self, is_open: bool, now_s: float) -> None:  # noqa: FBT001 - what it is about
         if is_open != self._is_open:
@@ -270,12 +253,9 @@ class Mailbox:
 
     def _given(self, trial: Trial, now_s: float) -> None:
         """Take a trial once, however often it comes."""
-        if trial.token in self.answered:
-            result = self.answered.pop(trial.token)
-            self.unacked[trial.token] = _Unacked(result, now_s)
-        elif trial.token in self.unacked:
-            self.unacked[trial.token].due_s = now_s
-        elif trial.token not in self.held and self._has_room():
+        if self.outbox.again(trial.token, now_s):
+            return
+        if trial.token not in self.held and self._has_room():
             self.held[trial.token] = trial
             self._out.append(Run(trial))
             self._renew_for_the_held(now_s)
@@ -289,13 +269,9 @@ class Mailbox:
         return self.warm and self.leaving is None and len(self.held) < HELD_MAX
 
     def _acked(self, token: str, verdict: Verdict = Verdict.COUNTED) -> None:
-        unacked = self.unacked.pop(token, None)
-        if unacked is not None:
-            if self.keeps and verdict is not Verdict.UNKNOWN:  # who does not know it has no say
-                self._out.append(Settled(token))
-            self.answered[token] = unacked.result
-            while len(self.answered) > ANSWERED_MAX:
-                self.answered.popitem(last=False)
+        # Who does not know a result has no say in whether it is kept.
+        if self.outbox.acked(token) and self.keeps and verdict is not Verdict.UNKNOWN:
+            self._out.append(Settled(token))
 
     # -- what the trial's thread says -----------------------------------------------------------
 
@@ -325,7 +301,7 @@ class Mailbox:
             self.running = None
             if self.welcomed:
                 self._life_s = min(self._life_s, now_s + IDLE_LEASES * self.lease_s)
-        self.unacked[result.token] = _Unacked(result, now_s)
+        self.outbox.put(result, now_s)
         if self.leaving is not None and not self.held:  # only an acknowledgement is waited for
             until_s = max(now_s, self.leaving.abort_s) + LEAVE_S
             self.leaving.until_s = min(self.leaving.until_s, until_s)
@@ -342,7 +318,8 @@ class Mailbox:
         if self.welcomed and now_s >= self._life_s:
             self._show_life(now_s)
         if self.welcomed:
-            self._resend(now_s)
+            for result in self.outbox.due(now_s):
+                self._send(result)
         if self.leaving is not None:
             self._go(self.leaving, now_s)
 
@@ -366,13 +343,6 @@ class Mailbox:
             self._send(Renew(boot=self.hello.boot, tokens=list(self.held)))
         self._life_s = now_s + RENEW_LEASES * self.lease_s
 
-    def _resend(self, now_s: float) -> None:
-        for unacked in self.unacked.values():
-            if now_s >= unacked.due_s:
-                self._send(unacked.result)
-                unacked.due_s = now_s + unacked.delay_s
-                unacked.delay_s = min(2 * unacked.delay_s, RESEND_S_MAX)
-
     def _give_up(self, running: _Running, now_s: float) -> None:
         """Report a hung trial; only a new process can help this one."""
         running.overdue_s = NEVER_S
@@ -389,7 +359,7 @@ class Mailbox:
             wall_s=trial.deadline_s,
             why=why,
         )
-        self.unacked[trial.token] = _Unacked(aborted, now_s)
+        self.outbox.put(aborted, now_s)
         self._leave(4, f"trial {trial.trial} {why}", now_s, finish=False)
 
     # -- leaving --------------------------------------------------------------------------------
@@ -406,7 +376,7 @@ class Mailbox:
             self._out.append(Abort(leaving.why))
         # A function cannot be aborted, so nobody waits for it; what is held goes back with a bye.
         idle = not self.held or (leaving.aborted and self.pulses)
-        settled = idle and not (self.unacked and self.welcomed)
+        settled = idle and not (self.outbox.unacked and self.welcomed)
         if settled or now_s >= leaving.until_s:
             if self.welcomed:
                 self._send(Bye(boot=self.hello.boot, why=clip(leaving.why)))

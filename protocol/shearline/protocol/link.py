@@ -46,7 +46,7 @@ PUBLISHERS_MAX = 4 * SESSIONS_MAX
 #: have on their way honestly, and bounded memory whatever they send.
 INTAKE_MAX = 1024
 
-#: Threads of Zenoh: one receives, for all sessions of the process, and accepts besides. A second one
+#: Threads of Zenoh: one receives, for all sessions of the process, and accepts too. A second one
 #: only takes turns with it: either way all wait once an intake is full.
 _RUNTIME = "(rx: (worker_threads: 1), acc: (handover: rx))"
 
