@@ -47,7 +47,7 @@ def test_a_start_that_makes_no_sense_is_one_sentence(
 ) -> None:
     cases = {
         ("sphere", "psp"): "other learned sleep-0 with x in [-5, 5] m: a run starts from another",
-        ("sleep-0", "ga"): "ga cannot start from another run: choose one of psp",
+        ("sleep-0", "lhs"): "lhs cannot start from another run: choose one of cmaes",
     }
     for (task, learner), why in cases.items():
         asked = ["up", "--task", task, "--learner", learner, "--warm-start", str(other)]
@@ -66,8 +66,8 @@ def test_where_there_is_no_run_there_is_nothing_to_start_from(
 
 
 def test_a_learner_that_cannot_is_refused_before_anything_is_read() -> None:
-    with pytest.raises(ConfigError, match="hireps cannot start"):
-        prior_of(Path("nowhere"), SPEC, "hireps")
+    with pytest.raises(ConfigError, match="lhs cannot start"):
+        prior_of(Path("nowhere"), SPEC, "lhs")
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -56,6 +57,24 @@ def run(learner: EpisodicLearner, episodes: int) -> np.ndarray:
 def test_the_first_episode_is_drawn_from_what_the_other_run_found(name: str) -> None:
     cold, warm = run(made(name), 1), run(made(name, prior()), 1)
     assert np.mean([outcome(u)[0] for u in warm]) < 0.8 * np.mean([outcome(u)[0] for u in cold])
+
+
+@pytest.mark.parametrize("name", CAN)
+def test_another_run_that_only_failed_stops_nobody(name: str) -> None:
+    lost = msgspec.structs.replace(prior(), success=[False] * 200)
+    proposed = run(made(name, lost), 2)
+    assert np.all((proposed >= SPACE.low) & (proposed <= SPACE.high))
+
+
+@pytest.mark.parametrize("boundary", ["transform", "penalty"])
+def test_cmaes_starts_where_the_other_run_stood_be_it_on_the_wall(boundary: str) -> None:
+    line = Space({"x": ("m", 0.0, 2.0)})
+    learner = create("cmaes", line, 20, seed=0, boundary=boundary)
+    assert isinstance(learner, EpisodicLearner)
+    learner.prime(Prior(theta=[[2.0]] * 9, cost=[1.0] * 9, success=[True] * 9))
+    first = np.array([p.theta for p in learner.ask(20)])
+    assert np.all(first <= 2.0)
+    assert first.mean() > 1.5
 
 
 @pytest.mark.parametrize("name", CAN)

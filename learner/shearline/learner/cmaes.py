@@ -21,7 +21,7 @@ from shearline.learner.charge import Failures, charged
 from shearline.learner.episodic import EpisodicLearner
 from shearline.learner.errors import LearnerError
 from shearline.learner.ledger import Trials
-from shearline.learner.recommend import Focus
+from shearline.learner.recommend import Focus, elite_focus
 from shearline.learner.switches import check, having, plain
 from shearline.learner.threads import fitting
 from shearline.protocol.space import Space
@@ -88,6 +88,9 @@ class CMAES(EpisodicLearner):
     An episode is never told as several generations: the package takes each for a sample around a
     mean that has moved since, and its steps shrink to nothing (5-D sphere: stuck at .03).
 
+    After another run it starts in the middle of the cheaper half of that run's successes, as wide
+    as ever; the trials themselves are never told, for they are no sample of its distribution.
+
     Args:
         space: What is being learned.
         episode_length: Trials between two updates.
@@ -99,6 +102,7 @@ class CMAES(EpisodicLearner):
     """
 
     name = "cmaes"
+    primes = True
     libraries = LIBRARIES
 
     def __init__(
@@ -119,7 +123,7 @@ class CMAES(EpisodicLearner):
             # then go to the best and the worst.
             warnings.simplefilter("ignore")
             if self._strategy is None:
-                self._strategy = self._make()
+                self._strategy = self._make(self._start(trials))
             self._told.update(self._tell_waiting(self._strategy, episode, trials))
             asked = self._strategy.ask(self.episode_length)
         self._solutions += [np.array(x) for x in asked]
@@ -129,7 +133,15 @@ class CMAES(EpisodicLearner):
         del rng
         return np.array(self._batch[index])
 
-    def _make(self) -> Any:
+    def _start(self, prior: Trials) -> Array:
+        """Return where the search starts: ``(n,)``, but two numbers where n is 1."""
+        n = len(self.space)
+        start = np.full(max(DIMENSIONS_MIN, n), self.config.start)
+        if prior.success.any():
+            start[:n] = elite_focus(prior, n).centre
+        return start
+
+    def _make(self, start: Array) -> Any:
         """Return the package's strategy on the unit cube, with its numbers from our generator."""
         try:
             # It ships no type information.
@@ -138,7 +150,6 @@ class CMAES(EpisodicLearner):
             raise LearnerError(
                 "cmaes needs the package cma: install shearline with the extra 'learner'"
             ) from None
-        n = max(DIMENSIONS_MIN, len(self.space))
         handlers = {
             Boundary.TRANSFORM: cma.BoundTransform,
             Boundary.PENALTY: cma.BoundPenalty,
@@ -153,10 +164,11 @@ class CMAES(EpisodicLearner):
         }
         if self.config.population is Population.EPISODE:
             options["popsize"] = max(POPULATION_MIN, self.episode_length)
-        return cma.CMAEvolutionStrategy(n * [self.config.start], self.config.spread, options)
+        return cma.CMAEvolutionStrategy(start, self.config.spread, options)
 
     def _tell_waiting(self, strategy: Any, episode: int, trials: Trials) -> list[int]:
         """Tell a strategy, as one generation, what ours was not told; return whose numbers."""
+        trials = trials.where(trials.number >= 0)
         told = [k in self._told for k in trials.number.tolist()]
         waiting = np.flatnonzero(~np.array(told, dtype=np.bool_))
         if len(waiting) < max(POPULATION_MIN, int(strategy.sp.weights.mu)):

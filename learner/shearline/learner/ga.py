@@ -67,7 +67,7 @@ class GAConfig:
 
 
 class GeneticAlgorithm(EpisodicLearner):
-    """One generation an episode; the first is uniform.
+    """One generation an episode; the first is uniform, or descends from another run's trials.
 
     Args:
         space: What is being learned.
@@ -77,6 +77,7 @@ class GeneticAlgorithm(EpisodicLearner):
     """
 
     name = "ga"
+    primes = True
 
     def __init__(
         self, space: Space, episode_length: int = 20, seed: int = 0, **switches: object

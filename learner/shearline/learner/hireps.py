@@ -97,6 +97,8 @@ def _check(holds: bool, name: str, expected: str, got: object) -> None:  # noqa:
 class HiREPS(EpisodicLearner):
     """Options that follow the reward, no further at a time than the samples reach.
 
+    After another run the first policy is already one update on, by that run's trials.
+
     Args:
         space: What is being learned.
         episode_length: N, trials between two updates.
@@ -105,6 +107,7 @@ class HiREPS(EpisodicLearner):
     """
 
     name = "hireps"
+    primes = True
     libraries = LIBRARIES
 
     def __init__(
@@ -117,6 +120,9 @@ class HiREPS(EpisodicLearner):
     def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
         if episode == 0:
             self._policies = [first_policy(len(self.space), rng, self.config)]
+            if len(trials):
+                with fitting():
+                    self._policies = [renew(self._policies, trials, self.config)]
         else:
             self._policies.append(self._renewed(trials))
 

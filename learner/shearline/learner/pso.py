@@ -69,6 +69,8 @@ class PSOConfig:
 class ParticleSwarm(EpisodicLearner):
     """A swarm of as many particles as an episode has trials; they begin uniformly spread.
 
+    After another run each begins at the best place that its trials there found, where one did.
+
     Args:
         space: What is being learned.
         episode_length: Number of particles.
@@ -77,6 +79,7 @@ class ParticleSwarm(EpisodicLearner):
     """
 
     name = "pso"
+    primes = True
 
     def __init__(
         self, space: Space, episode_length: int = 20, seed: int = 0, **switches: object
@@ -89,7 +92,7 @@ class ParticleSwarm(EpisodicLearner):
     def _begin(self, episode: int, trials: Trials, rng: np.random.Generator) -> None:
         shape = (self.episode_length, len(self.space))
         if episode == 0:
-            self._place = rng.random(shape)
+            self._place, _ = best_places(trials, rng.random(shape), self.config.failures)
             self._velocity = self.config.speed * rng.uniform(-1.0, 1.0, shape)
             return
         own, swarm = best_places(trials, self._place, self.config.failures)

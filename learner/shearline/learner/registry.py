@@ -34,7 +34,7 @@ LEARNERS: Mapping[str, str] = MappingProxyType(
 EXTRAS: Mapping[str, str] = MappingProxyType({"tpe": "shearline.learner.tpe:TPE"})
 
 #: Those that can start from the trials of another run.
-PRIMED = frozenset({"psp-ranked", "psp", "psp-paper", "tpe"})
+PRIMED = frozenset({"psp-ranked", "psp", "psp-paper", "hireps", "cmaes", "ga", "pso", "tpe"})
 
 #: Not an optimiser, so not listed: it tries the tuples it is given, ``tuples=[...]``.
 UNLISTED: Mapping[str, str] = MappingProxyType({"plan": "shearline.learner.plan:Plan"})
