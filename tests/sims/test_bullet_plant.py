@@ -8,10 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from shearline.protocol.errors import ConfigError
 from shearline.sims.bullet_plant import BulletPlant
 from shearline.sims.bullet_world import BulletSettings
-from shearline.sims.grasp import Grasp
 from shearline.sims.lock import Lock
 from shearline.sims.mujoco_plant import MujocoPlant
 from shearline.sims.panda import DAMPING, JOINTS, Array
@@ -133,8 +131,3 @@ def test_the_engine_says_nothing_of_itself() -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
     assert (done.stdout, done.stderr) == ("data\n", "")
-
-
-def test_a_key_that_gives_or_sits_off_is_refused_in_one_sentence() -> None:
-    with pytest.raises(ConfigError, match="leave the switches grasp and pads out"):
-        BulletPlant(Scene(grasp=Grasp()))

@@ -21,16 +21,21 @@ from typing import Any
 
 from shearline.sims import urdf
 from shearline.sims.dynamics import GRAVITY
+from shearline.sims.hold import Hold, hold
 from shearline.sims.lock import PINS
 from shearline.sims.panda import JOINTS, Array
-from shearline.sims.scene import TICK_S, Pose, Scene, quaternion
+from shearline.sims.plant import Setup
+from shearline.sims.scene import TICK_S, Scene, quaternion
 
 #: Bullet numbers joints, and the links behind them, in the order of the file.
 _JOINTS, _PINS = tuple(range(JOINTS)), tuple(range(PINS))
-_BLADE, _BITTING = JOINTS, JOINTS + 1
 
 #: More than any gear has to carry [N m].
 _GEAR_MAX = 1e5
+
+#: Bullet cuts off what moves faster. A key let go of between its pads does so above Bullet's own
+#: 100 [rad/s].
+_SPEED_MAX = 1e4
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +69,15 @@ class BulletSettings:
         return TICK_S / self.substeps
 
 
+def converged(scene: Scene) -> BulletSettings:
+    """Return settings that were shown to be converged for a scene.
+
+    A key that is let go of between its pads goes a millimetre in a millisecond: at whole
+    milliseconds it is found deep in the wall, and thrown out with a thousand newtons.
+    """
+    return BulletSettings(substeps=2 if scene.grip_joints else 1)
+
+
 class BulletWorld:
     """One world, empty until :meth:`build`.
 
@@ -76,8 +90,9 @@ class BulletWorld:
         self._bullet = bullet()
         self._settings = settings
         self._scene = scene
+        self._moving = tuple(range(JOINTS + scene.grip_joints))
         self.files = {
-            "arm.urdf": urdf.arm(scene),
+            "arm.urdf": urdf.arm(scene, hold(scene, Setup(), settings.timestep_s)),
             "rotors.urdf": urdf.rotors(),
             "walls.urdf": urdf.lock_walls(scene),
             "pins.urdf": urdf.lock_pins(scene),
@@ -87,21 +102,22 @@ class BulletWorld:
         weakref.finalize(self, _disconnect, self._bullet, self._client)
         self._arm = self._rotors = self._walls = self._pins = -1
 
-    def build(self, lock: Pose, friction: float, q: Sequence[float]) -> None:
+    def build(self, setup: Setup, held: Hold | None) -> None:
         """Throw away what there was and load everything anew, at rest.
 
         Nothing of the trial before survives: neither cached contacts nor the order of pairs.
 
         Args:
-            lock: Where the lock stands.
-            friction: Coulomb coefficient of every contact.
-            q: Joint angles of the arm ``(7,)`` [rad].
+            setup: Of the trial.
+            held: How the fingers hold the key; ``None``: hand and key are one piece.
         """
         b, client = self._bullet, self._client
+        lock, own = setup.lock, self._scene.lock.friction
+        files = self.files | {"arm.urdf": urdf.arm(self._scene, held)}
         empty(b, client, self._settings)
         w, x, y, z = quaternion(lock.rotation).tolist()
         with tempfile.TemporaryDirectory(prefix="shearline-") as folder:
-            for name, text in self.files.items():
+            for name, text in files.items():
                 Path(folder, name).write_text(text)
             self._arm = self._load(folder, "arm")
             self._rotors = self._load(folder, "rotors")
@@ -110,35 +126,37 @@ class BulletWorld:
             self._pins = self._load(folder, "pins", *place)
         self._release()
         self._gear()
-        self._collide(friction)
-        for joint, angle in enumerate(q):
+        self._collide(own if setup.friction is None else setup.friction)
+        for joint, angle in enumerate(setup.q):
             b.resetJointState(self._arm, joint, angle, physicsClientId=client)
 
     def arm(self, state: Array) -> None:
-        """Fill ``state (3, 7)``: angles [rad], speeds, speeds of the flywheels [rad/s]."""
-        b, client = self._bullet, self._client
-        moving = b.getJointStates(self._arm, _JOINTS, physicsClientId=client)
-        turning = b.getJointStates(self._rotors, _JOINTS, physicsClientId=client)
-        for j in range(JOINTS):
-            state[0, j], state[1, j] = moving[j][:2]
-            state[2, j] = turning[j][1]
+        """Fill ``state (3, n)``: angles [rad], speeds, speeds of the flywheels [rad/s].
 
-    def pins(self, travel: Array) -> None:
-        """Fill ``travel (5,)`` [m]."""
+        The hinges of the grasp come behind the arm's joints and have no flywheels.
+        """
+        b, client = self._bullet, self._client
+        moving = b.getJointStates(self._arm, self._moving, physicsClientId=client)
+        turning = b.getJointStates(self._rotors, _JOINTS, physicsClientId=client)
+        state[0] = [joint[0] for joint in moving]
+        state[1] = [joint[1] for joint in moving]
+        state[2, :JOINTS] = [joint[1] for joint in turning]
+
+    def pins(self) -> list[float]:
+        """Return how far the pins are pushed in ``(5,)`` [m]."""
         found = self._bullet.getJointStates(self._pins, _PINS, physicsClientId=self._client)
-        for i in range(PINS):
-            travel[i] = found[i][0]
+        return [pin[0] for pin in found]
 
     def step(self, tau: Sequence[float], springs: Sequence[float]) -> None:
         """Move on by one step of the engine.
 
         Args:
-            tau: Torques on the joints ``(7,)`` [N m].
+            tau: Torques on the joints, then on the hinges of the grasp ``(n,)`` [N m].
             springs: Forces on the pins ``(5,)`` [N].
         """
         b, client = self._bullet, self._client
         b.setJointMotorControlArray(
-            self._arm, _JOINTS, b.TORQUE_CONTROL, forces=tau, physicsClientId=client
+            self._arm, self._moving, b.TORQUE_CONTROL, forces=tau, physicsClientId=client
         )
         b.setJointMotorControlArray(
             self._pins, _PINS, b.TORQUE_CONTROL, forces=springs, physicsClientId=client
@@ -158,14 +176,20 @@ class BulletWorld:
         return body
 
     def _release(self) -> None:
-        """Switch off what Bullet switches on by itself: joint motors, and damping by the air."""
+        """Switch off what Bullet switches on: motors, damping by the air, a speed limit."""
         b, client = self._bullet, self._client
-        for body, joints in ((self._arm, _JOINTS), (self._rotors, _JOINTS), (self._pins, _PINS)):
+        moving = ((self._arm, self._moving), (self._rotors, _JOINTS), (self._pins, _PINS))
+        for body, joints in moving:
             b.setJointMotorControlArray(
                 body, joints, b.VELOCITY_CONTROL, forces=[0.0] * len(joints), physicsClientId=client
             )
             b.changeDynamics(
-                body, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client
+                body,
+                -1,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                maxJointVelocity=_SPEED_MAX,
+                physicsClientId=client,
             )
 
     def _gear(self) -> None:
@@ -189,12 +213,13 @@ class BulletWorld:
             "contactStiffness": self._settings.stiffness,
             "contactDamping": self._settings.damping,
         }
-        key = {"lateralFriction": 1.0}
+        key, links = {"lateralFriction": 1.0}, self._links()
+        blade = links["hand" if self._scene.grasp is None else "blade"]
         for body, link, surface, group, mask in (
             (self._walls, -1, lock, 1, 2),
-            (self._arm, _BLADE, key, 2, 1),
+            (self._arm, blade, key, 2, 1),
             *((self._pins, pin, lock, 4, 8) for pin in _PINS),
-            (self._arm, _BITTING, key, 8, 4),
+            (self._arm, links["key"], key, 8, 4),
         ):
             b.setCollisionFilterGroupMask(body, link, group, mask, physicsClientId=client)
             b.changeDynamics(
@@ -206,6 +231,13 @@ class BulletWorld:
                 physicsClientId=client,
                 **surface,
             )
+
+    def _links(self) -> dict[str, int]:
+        """Return what Bullet numbers the arm's links by."""
+        b, client = self._bullet, self._client
+        count = b.getNumJoints(self._arm, physicsClientId=client)
+        infos = (b.getJointInfo(self._arm, i, physicsClientId=client) for i in range(count))
+        return {info[12].decode(): info[0] for info in infos}
 
 
 def empty(library: Any, client: int, settings: BulletSettings) -> None:

@@ -1,7 +1,8 @@
 """The arm's equations of motion, compiled: pose and Jacobian of the tip, Newton and Euler.
 
 For plants whose engine does not hand them out cheaply. Link frames are Craig's, as in
-:mod:`shearline.sims.panda`; hand and key are one body with the last link.
+:mod:`shearline.sims.panda`; hand and key are one body with the last link, unless the key turns
+between the fingers: then two more joints follow.
 """
 
 from __future__ import annotations
@@ -13,21 +14,26 @@ import numpy as np
 
 from shearline.sims import panda
 from shearline.sims.compiled import compiled
-from shearline.sims.panda import JOINTS, Array
-from shearline.sims.scene import KEY_INERTIA, KEY_MASS, KEY_TURN, TIP_M, Scene
+from shearline.sims.hold import TO_TIP, Hold
+from shearline.sims.panda import Array
+from shearline.sims.scene import KEY_INERTIA, KEY_MASS, KEY_TURN, TIP_M, Pose, Scene
 
 GRAVITY = 9.81
 
+#: Rotations whose z axis, about which every joint turns, is the x and the y axis of the frame.
+_ABOUT_X: Array = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+_ABOUT_Y: Array = _ABOUT_X.T.copy()
+
 
 class Chain(NamedTuple):
-    """The arm as arrays.
+    """The arm as arrays, of n joints: 7, or 9 where the grasp gives.
 
     Attributes:
-        offset: Of each joint in the frame of the link before it ``(7, 3)`` [m].
-        twist: Rotation from there to the joint at angle 0 ``(7, 3, 3)``.
-        mass: Of each link ``(7,)`` [kg].
-        centre: Its centre of mass in its frame ``(7, 3)`` [m].
-        inertia: About that centre ``(7, 3, 3)`` [kg m^2].
+        offset: Of each joint in the frame of the link before it ``(n, 3)`` [m].
+        twist: Rotation from there to the joint at angle 0 ``(n, 3, 3)``.
+        mass: Of each link ``(n,)`` [kg].
+        centre: Its centre of mass in its frame ``(n, 3)`` [m].
+        inertia: About that centre ``(n, 3, 3)`` [kg m^2].
         tip: Of the key in the frame of the last link ``(3,)`` [m].
         turn: Of the key in that frame ``(3, 3)``.
     """
@@ -48,29 +54,48 @@ class Body(NamedTuple):
     centre: Array
     inertia: Array
 
+    def placed(self, pose: Pose) -> Body:
+        """Return the body in the frame in which its own frame has this pose."""
+        turn = pose.rotation
+        return Body(self.mass, pose.position + turn @ self.centre, turn @ self.inertia @ turn.T)
 
-def chain(scene: Scene) -> Chain:
-    """Return the arm that holds the scene's key."""
+
+def chain(scene: Scene, hold: Hold | None = None) -> Chain:
+    """Return the arm that holds the scene's key.
+
+    Args:
+        scene: With the key.
+        hold: How the fingers hold it; ``None``: hand and key are one piece.
+    """
     bodies = [Body(link.mass, np.array(link.centre), _tensor(link.inertia)) for link in panda.LINKS]
-    hand = panda.rotation_z(-np.pi / 4.0)
-    turn = panda.rotation_z(KEY_TURN)
-    tip = np.array([0.0, 0.0, panda.FLANGE_M + TIP_M])
-    bow = tip - np.array([0.0, 0.0, scene.lock.key.length_m])
-    held = Body(
-        panda.HAND_MASS,
-        np.array([0.0, 0.0, panda.FLANGE_M]) + hand @ np.array(panda.HAND_CENTRE),
-        hand @ np.diag(panda.HAND_INERTIA) @ hand.T,
-    )
-    key = Body(KEY_MASS, bow, turn @ np.diag(KEY_INERTIA) @ turn.T)
-    bodies[-1] = joined((bodies[-1], held, key))
+    hand = Body(panda.HAND_MASS, np.array(panda.HAND_CENTRE), np.diag(panda.HAND_INERTIA))
+    flange = Pose(np.array([0.0, 0.0, panda.FLANGE_M]), panda.rotation_z(-np.pi / 4.0))
+    bow = np.array([0.0, 0.0, -scene.lock.key.length_m])
+    key = Body(KEY_MASS, bow, np.diag(KEY_INERTIA))
+    offset = [np.array(panda.link_offset(link)) for link in panda.LINKS]
+    twist = [panda.rotation_x(link.alpha) for link in panda.LINKS]
+    fixed = [bodies.pop(), hand.placed(flange)]
+    if hold is None:
+        tip = Pose(np.array([0.0, 0.0, panda.FLANGE_M + TIP_M]), panda.rotation_z(KEY_TURN))
+    else:
+        tip = hold.middle.moved(TO_TIP, np.zeros(3))
+    if hold is None or not hold.hinges:
+        bodies.append(joined((*fixed, key.placed(tip))))
+    else:
+        tip = Pose(_ABOUT_Y.T @ TO_TIP, _ABOUT_Y.T)
+        offset += [hold.middle.position, np.zeros(3)]
+        twist += [hold.middle.rotation @ _ABOUT_X, _ABOUT_X.T @ _ABOUT_Y]
+        about_x, about_y = (hinge.added for hinge in hold.hinges)
+        key = key._replace(inertia=key.inertia + np.diag([0.0, about_y, about_y]))
+        bodies += [joined(fixed), Body(0.0, np.zeros(3), about_x * np.eye(3)), key.placed(tip)]
     return Chain(
-        offset=np.array([panda.link_offset(link) for link in panda.LINKS]),
-        twist=np.array([panda.rotation_x(link.alpha) for link in panda.LINKS]),
+        offset=np.array(offset),
+        twist=np.array(twist),
         mass=np.array([body.mass for body in bodies]),
         centre=np.array([body.centre for body in bodies]),
         inertia=np.array([body.inertia for body in bodies]),
-        tip=tip,
-        turn=turn,
+        tip=tip.position,
+        turn=tip.rotation,
     )
 
 
@@ -92,14 +117,14 @@ def forward(c: Chain, q: Array, tip: Array, rotation: Array, jacobian: Array) ->
 
     Args:
         c: The arm.
-        q: Joint angles ``(7,)`` [rad].
+        q: Joint angles ``(n,)`` [rad].
         tip: Position ``(3,)`` [m].
         rotation: Of the key ``(3, 3)``.
-        jacobian: Translation first ``(6, 7)``.
+        jacobian: Translation first ``(6, n)``.
     """
     at, turn, frame = np.zeros(3), np.eye(3), np.empty((3, 3))
-    anchor, axis = np.empty((JOINTS, 3)), np.empty((JOINTS, 3))
-    for j in range(JOINTS):
+    anchor, axis = np.empty((len(q), 3)), np.empty((len(q), 3))
+    for j in range(len(q)):
         _joint_frame(c, j, q[j], frame)
         _add_turned(turn, c.offset[j], at)
         _multiply_in_place(turn, frame)
@@ -109,7 +134,7 @@ def forward(c: Chain, q: Array, tip: Array, rotation: Array, jacobian: Array) ->
     _multiply_in_place(turn, c.turn)
     tip[:] = at
     rotation[:] = turn
-    for j in range(JOINTS):
+    for j in range(len(q)):
         ax, ay, az = axis[j]
         rx, ry, rz = at[0] - anchor[j, 0], at[1] - anchor[j, 1], at[2] - anchor[j, 2]
         jacobian[0, j] = ay * rz - az * ry
@@ -120,22 +145,23 @@ def forward(c: Chain, q: Array, tip: Array, rotation: Array, jacobian: Array) ->
 
 @compiled
 def inverse(c: Chain, q: Array, dq: Array, ddq: Array, tau: Array) -> None:
-    """Fill the torques ``tau (7,)`` that move the links so, gravity included.
+    """Fill the torques ``tau (n,)`` that move the links so, gravity included.
 
     Newton and Euler, outward for motions, inward for forces, each in the link's own frame (Luh,
     Walker and Paul 1980; Craig's form). Rotor inertia and joint friction are not part of it.
 
     Args:
         c: The arm.
-        q: Joint angles ``(7,)`` [rad].
-        dq: Their speeds ``(7,)`` [rad/s].
-        ddq: Their accelerations ``(7,)`` [rad/s^2].
+        q: Joint angles ``(n,)`` [rad].
+        dq: Their speeds ``(n,)`` [rad/s].
+        ddq: Their accelerations ``(n,)`` [rad/s^2].
         tau: Torques [N m].
     """
-    frames = np.empty((JOINTS, 3, 3))
-    forces, moments = np.empty((JOINTS, 3)), np.empty((JOINTS, 3))
+    joints = len(q)
+    frames = np.empty((joints, 3, 3))
+    forces, moments = np.empty((joints, 3)), np.empty((joints, 3))
     w, dw, dv = np.zeros(3), np.zeros(3), np.array([0.0, 0.0, GRAVITY])
-    for j in range(JOINTS):
+    for j in range(joints):
         _joint_frame(c, j, q[j], frames[j])
         dv = _turned_back(frames[j], dv + _arc(w, dw, c.offset[j]))
         w, dw = _turned_back(frames[j], w), _turned_back(frames[j], dw)
@@ -147,8 +173,8 @@ def inverse(c: Chain, q: Array, dq: Array, ddq: Array, tau: Array) -> None:
         moments[j] = _turned(c.inertia[j], dw) + _cross(w, _turned(c.inertia[j], w))
         moments[j] += _cross(c.centre[j], forces[j])
     f, n = np.zeros(3), np.zeros(3)
-    for k in range(JOINTS):
-        j = JOINTS - 1 - k
+    for k in range(joints):
+        j = joints - 1 - k
         f, n = f + forces[j], n + moments[j]
         tau[j] = n[2]
         f, n = _turned(frames[j], f), _turned(frames[j], n)

@@ -21,7 +21,7 @@ from shearline.sims.compiled import call_with_two_addresses, compiled
 from shearline.sims.lock import PINS
 from shearline.sims.panda import JOINTS, Array
 from shearline.sims.plant import Percept, PlantError, Setup
-from shearline.sims.scene import Scene, key_in_hand, quaternion
+from shearline.sims.scene import Scene, quaternion
 
 _log = logging.getLogger(__name__)
 
@@ -182,13 +182,10 @@ class MujocoPlant:
 
     def _hold(self, setup: Setup) -> None:
         """Put the key between the fingers."""
-        if self.scene.grasp is None:
-            if any(setup.grip):
-                raise PlantError("the key sits off in the fingers, expected a scene with a grasp")
-            return
-        pose, key = key_in_hand(setup.grip), self.model.body("key")
-        key.pos[:] = pose.position
-        key.quat[:] = quaternion(pose.rotation)
+        pose, key = setup.key_in_hand(self.scene), self.model.body("key")
+        if self.scene.grasp is not None:
+            key.pos[:] = pose.position
+            key.quat[:] = quaternion(pose.rotation)
 
     def sense(self, percept: Percept) -> None:
         """Fill ``percept`` with the present."""

@@ -17,7 +17,7 @@ from shearline.protocol.errors import ShearlineError
 from shearline.sims.lock import PINS
 from shearline.sims.noise import TorqueNoise
 from shearline.sims.panda import JOINTS, Array
-from shearline.sims.scene import Q_START, Pose, believed_lock_pose
+from shearline.sims.scene import Q_START, Pose, Scene, believed_lock_pose, key_in_hand
 
 
 class PlantError(ShearlineError):
@@ -94,6 +94,16 @@ class Setup:
     grip: tuple[float, ...] = (0.0,) * 6
     pad_scale: float = 1.0
     noise: TorqueNoise | None = None
+
+    def key_in_hand(self, scene: Scene) -> Pose:
+        """Return the frame of the key in that of the last link, nothing loaded.
+
+        Raises:
+            PlantError: If the key is to sit off in a scene in which it is one with the hand.
+        """
+        if scene.grasp is None and any(self.grip):
+            raise PlantError("the key sits off in the fingers, expected a scene with a grasp")
+        return key_in_hand(self.grip)
 
 
 class Plant(Protocol):

@@ -4,7 +4,8 @@ The same numbers as in :mod:`shearline.sims.scene`, for an engine that reads URD
 bodies because solving a contact costs with the joints of the bodies that meet in it, whether they
 move or not. There is nothing to see in it: pictures are drawn from the scene, whatever simulates
 it. What may touch what is decided by link: the blade, which meets the walls, is a part of
-the hand, and the bitting, which meets the pins, one of the key.
+the hand, or a link of its own where fingers hold the key, and the bitting, which meets the pins,
+one of the key.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import math
 import numpy as np
 
 from shearline.sims import panda
+from shearline.sims.grasp import GRIP_M
+from shearline.sims.hold import Hold
 from shearline.sims.lock import Box, Key, Lock, Pin, Triple, blade, walls
 from shearline.sims.panda import Link
 from shearline.sims.scene import KEY_INERTIA, KEY_MASS, KEY_TURN, TIP_M, Scene
@@ -39,31 +42,21 @@ _ZERO: Triple = (0.0, 0.0, 0.0)
 _HAND_TURN = -math.pi / 4.0
 
 
-def arm(scene: Scene) -> str:
-    """Return the arm with the key in its hand."""
+def arm(scene: Scene, hold: Hold | None = None) -> str:
+    """Return the arm with the key in its hand.
+
+    Joints that move come first, in the order of the chain.
+
+    Args:
+        scene: With lock and key.
+        hold: How the fingers hold the key; ``None``: hand and key are one piece.
+    """
     parents = ("base", *(link.name for link in panda.LINKS))
     parts = [_link("base", _anchor())]
     for parent, link in zip(parents, panda.LINKS, strict=False):
         parts += [_arm_joint(parent, link), _arm_link(link)]
     key = scene.lock.key
-    parts += [
-        _joint(
-            "hand",
-            "fixed",
-            (parents[-1], "hand"),
-            (0.0, 0.0, panda.FLANGE_M),
-            (0.0, 0.0, _HAND_TURN),
-        ),
-        _hand(key),
-        _joint(
-            "key",
-            "fixed",
-            (parents[-1], "key"),
-            (0.0, 0.0, panda.FLANGE_M + TIP_M),
-            (0.0, 0.0, KEY_TURN),
-        ),
-        _key(key),
-    ]
+    parts += _one_piece(key) if hold is None else [*_held(key, hold), _hand_joint(), _hand()]
     return _robot("arm", parts)
 
 
@@ -129,24 +122,62 @@ def _arm_link(link: Link) -> str:
     return _link(link.name, _inertial(link.mass, link.centre, link.inertia))
 
 
-def _hand(key: Key) -> str:
-    """Return the hand; the key's outline is placed in its frame."""
+def _one_piece(key: Key) -> list[str]:
+    """Return the hand, which has the key's outline, and the key."""
     outline = blade(key)
     centre = (0.0, 0.0, TIP_M + outline.centre[2])
-    turn = KEY_TURN - _HAND_TURN
-    return _link(
-        "hand",
-        _inertial(panda.HAND_MASS, panda.HAND_CENTRE, panda.HAND_INERTIA),
-        _collision(_box(outline), centre, (0.0, 0.0, turn)),
-    )
+    shape = _collision(_box(outline), centre, (0.0, 0.0, KEY_TURN - _HAND_TURN))
+    at, turn = (0.0, 0.0, panda.FLANGE_M + TIP_M), (0.0, 0.0, KEY_TURN)
+    place = _joint("key", "fixed", (panda.LINKS[-1].name, "key"), at, turn)
+    return [_hand_joint(), _hand(shape), place, _key(key)]
 
 
-def _key(key: Key) -> str:
+def _held(key: Key, hold: Hold) -> list[str]:
+    """Return the key between fingers; its link stands in the middle of the grip."""
+    last, (x, y, z) = panda.LINKS[-1].name, hold.middle.position.tolist()
+    if not hold.hinges:
+        joints, about_y = [_joint("key", "fixed", (last, "key"), (x, y, z), hold.turn)], 0.0
+    else:
+        about_x, about_y = (hinge.added for hinge in hold.hinges)
+        axis = '<axis xyz="1 0 0"/>'
+        joints = [
+            _joint("grip0", "continuous", (last, "pads"), (x, y, z), hold.turn, axis),
+            _link("pads", _inertial(0.0, _ZERO, (about_x,) * 3)),
+            _joint("grip1", "continuous", ("pads", "key"), _ZERO, _ZERO, '<axis xyz="0 1 0"/>'),
+        ]
+    outline = blade(key)
+    return [
+        *joints,
+        _key(key, GRIP_M, about_y),
+        _joint("blade", "fixed", ("key", "blade"), (0.0, 0.0, GRIP_M)),
+        _link("blade", _inertial(0.0, _ZERO, _ZERO), _collision(_box(outline), outline.centre)),
+    ]
+
+
+def _hand_joint() -> str:
+    at, turn = (0.0, 0.0, panda.FLANGE_M), (0.0, 0.0, _HAND_TURN)
+    return _joint("hand", "fixed", (panda.LINKS[-1].name, "hand"), at, turn)
+
+
+def _hand(*shapes: str) -> str:
+    inertia = _inertial(panda.HAND_MASS, panda.HAND_CENTRE, panda.HAND_INERTIA)
+    return _link("hand", inertia, *shapes)
+
+
+def _key(key: Key, tip_m: float = 0.0, added: float = 0.0) -> str:
+    """Return the key.
+
+    Args:
+        key: Its bitting.
+        tip_m: Where the tip is along z [m].
+        added: Inertia about y [kg m^2]; as that of a rod along x, or Bullet refuses the sum.
+    """
+    x, y, z = KEY_INERTIA
     return _link(
         "key",
-        _inertial(KEY_MASS, (0.0, 0.0, -key.length_m), KEY_INERTIA),
-        _collision(f'<mesh filename="{BITTING_MESH}"/>', turn=_ASKEW, concave=True),
-        _speck(-SPECK_M),
+        _inertial(KEY_MASS, (0.0, 0.0, tip_m - key.length_m), (x, y + added, z + added)),
+        _collision(f'<mesh filename="{BITTING_MESH}"/>', (0.0, 0.0, tip_m), _ASKEW, concave=True),
+        _speck(-SPECK_M, tip_m),
     )
 
 
@@ -172,9 +203,9 @@ def _pin_link(pin: Pin, lock: Lock) -> str:
     )
 
 
-def _speck(y: float) -> str:
+def _speck(y: float, z: float = 0.0) -> str:
     """Return a grain of dust that touches nothing; see :data:`SPECK_M`."""
-    return _collision('<sphere radius="0.0001"/>', (0.0, y, 0.0))
+    return _collision('<sphere radius="0.0001"/>', (0.0, y, z))
 
 
 def _robot(name: str, parts: list[str]) -> str:

@@ -27,6 +27,13 @@ def register(kinds: Subparsers) -> None:
         "--tuples", type=positive, default=50, metavar="N", help="verdicts compared, default 50"
     )
     agreement.add_argument(
+        "--task",
+        default="keylock",
+        metavar="LEVEL",
+        help="on which their verdicts are compared, such as keylock+grasp+pads+noise;"
+        " default keylock",
+    )
+    agreement.add_argument(
         "--motions", type=positive, default=10, metavar="N", help="through free space, default 10"
     )
     agreement.add_argument(
@@ -42,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     from shearline.evaluator.agreement.compare import Findings, compare  # noqa: PLC0415 - engines
 
     found = Findings()
-    for row in compare(arguments.tuples, arguments.motions, found):
+    for row in compare(arguments.tuples, arguments.motions, found, arguments.task):
         if not arguments.json:
             print(line(row), flush=True)
     pictures = []

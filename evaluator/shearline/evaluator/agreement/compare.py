@@ -76,18 +76,23 @@ class Findings:
     tried: list[Tried] = field(default_factory=list)
 
 
-def compare(tuples: int, motions: int, found: Findings) -> Iterator[Row]:
+def compare(tuples: int, motions: int, found: Findings, task: str = "keylock") -> Iterator[Row]:
     """Compare the engines and yield each row as it is there.
 
     Args:
         tuples: Random tuples whose verdicts are compared.
         motions: Random motions through free space.
         found: Filled on the way.
+        task: Level, with or without switches, on which the tuples are tried; all the rest is on
+            the plain lock.
+
+    Raises:
+        ConfigError: If there is no such level or switch.
     """
-    tasks = (KeylockTask(), BulletKeylockTask())
+    tried = (KeylockTask(task), BulletKeylockTask(task))
     yield from _kept(found, _mechanics())
-    yield from _kept(found, _scenes(tasks, motions, found))
-    yield from _kept(found, _verdicts(tasks, tuples, found))
+    yield from _kept(found, _scenes((KeylockTask(), BulletKeylockTask()), motions, found))
+    yield from _kept(found, _verdicts(tried, tuples, found))
 
 
 def _kept(found: Findings, rows: Iterator[Row]) -> Iterator[Row]:
@@ -153,5 +158,6 @@ def _verdicts(
         found.tried.append(Tried(seed, (ours, theirs), (ours_cost, theirs_cost)))
     rates = np.mean([tried.success for tried in found.tried], axis=0)
     other = float(np.mean([tried.success[0] != tried.success[1] for tried in found.tried]))
-    what = f"success of {tuples} random tuples (difference: other verdicts)"
+    name = tasks[0].spec.name
+    what = f"success of {tuples} random tuples on {name} (difference: other verdicts)"
     yield Row(what, "", float(rates[0]), float(rates[1]), None, other, 0.15)
