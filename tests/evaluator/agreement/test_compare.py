@@ -59,9 +59,10 @@ def test_a_blow_keeps_the_momentum_and_at_most_half_of_the_speed_between_the_blo
 
 
 @pytest.mark.slow
-def test_every_comparison_of_the_study_is_within_its_limit() -> None:
+@pytest.mark.parametrize("task", ["keylock", "keylock+grasp+pads+noise"])
+def test_every_comparison_of_the_study_is_within_its_limit(task: str) -> None:
     found = Findings()
-    wrong = [row for row in compare(12, 2, found) if not row.agrees]
+    wrong = [row for row in compare(12, 2, found, task) if not row.agrees]
     assert not wrong
     assert len(found.tried) == 12
     assert len(found.force) == len(found.slip) == 2

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 LEVELS = ("keylock", "keylock-limit", "keylock-jam")
 #: What a lab varies all at once, for transfer; levels that have some of it leave that out.
 VARIATION = ("friction", "pins", "grasp", "pads", "noise")
-#: Of that, what every plant honours.
-EVERYWHERE = ("friction", "pins", "noise")
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,8 +163,7 @@ def run_transfer(arguments: argparse.Namespace) -> int:
     from shearline.deploy.studies.transfer import places_of, table, transfer  # noqa: PLC0415
     from shearline.evaluator.builtin import builtin_spec  # noqa: PLC0415
 
-    varied = VARIATION if arguments.plants == [DEFAULT] else EVERYWHERE
-    tasks = arguments.tasks or [arguments.level, _varied(arguments.level, varied)]
+    tasks = arguments.tasks or [arguments.level, _varied(arguments.level, VARIATION)]
     tasks = list(dict.fromkeys(builtin_spec(task).name for task in tasks))
     places = places_of(arguments.plants, tasks)
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.experiments)
