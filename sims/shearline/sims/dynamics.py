@@ -95,7 +95,7 @@ def chain(scene: Scene, hold: Hold | None = None) -> Chain:
         centre=np.array([body.centre for body in bodies]),
         inertia=np.array([body.inertia for body in bodies]),
         tip=tip.position,
-        turn=tip.rotation,
+        turn=np.ascontiguousarray(tip.rotation),  # another layout would be compiled for anew
     )
 
 
