@@ -186,7 +186,8 @@ def load_task(name: str, plant: str = DEFAULT) -> Task:
     where, colon, function = name.partition(":")
     if not colon:
         return builtin_task(name, plant)
-    module, called = import_code(where)
+    built_in = f"a built-in ({', '.join(builtin_names())}) or FILE:FUNCTION"
+    module, called = import_code(where, built_in)
     found = getattr(module, function, None)
     if not callable(found):
         tasks = [f"{called}:{key}" for key, value in vars(module).items() if hasattr(value, _MARK)]
@@ -196,8 +197,12 @@ def load_task(name: str, plant: str = DEFAULT) -> Task:
     return FunctionTask(found, f"{called}:{function}")
 
 
-def import_code(where: str) -> tuple[ModuleType, str]:
+def import_code(where: str, expected: str) -> tuple[ModuleType, str]:
     """Import a file or a module that a person named; return it and the name it goes by.
+
+    Args:
+        where: A file, with or without its ``.py``, or a module.
+        expected: What might have been named instead; said if there is neither.
 
     Raises:
         ConfigError: If there is none, or it cannot be imported.
@@ -211,8 +216,7 @@ def import_code(where: str) -> tuple[ModuleType, str]:
     except ModuleNotFoundError as missing:
         if missing.name is not None and where.startswith(missing.name):
             raise ConfigError(
-                f"no file {path} in {Path.cwd()} and no module {where!r}: expected a built-in"
-                f" ({', '.join(builtin_names())}) or FILE:FUNCTION"
+                f"no file {path} in {Path.cwd()} and no module {where!r}: expected {expected}"
             ) from None
         raise ConfigError(f"{where} cannot be imported: {missing}") from None
     except SyntaxError as fault:

@@ -54,9 +54,20 @@ def test_a_mistake_is_one_sentence_that_names_the_file(text: str, tmp_path: Path
     assert "\n" not in said
 
 
-def test_a_file_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(BoundsError, match="cannot be read"):
-        read_bounds(tmp_path / "none.toml")
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("none.toml", "there is no bounds file .*none.toml: copy docs/examples/lab.toml"),
+        ("folder.toml", "the bounds file .*folder.toml cannot be read: Is a directory"),
+        ("bytes.toml", "the bounds file .*bytes.toml is no text: expected TOML"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_one_sentence(name: str, why: str, tmp_path: Path) -> None:
+    (tmp_path / "folder.toml").mkdir()
+    (tmp_path / "bytes.toml").write_bytes(b"\xff")
+    with pytest.raises(BoundsError, match=f"^{why}[^\\n]*$") as refused:
+        read_bounds(tmp_path / name)
+    assert "Errno" not in str(refused.value)
 
 
 @pytest.mark.parametrize("name", ["lab.toml", "stage.toml"])

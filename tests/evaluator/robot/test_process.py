@@ -72,7 +72,7 @@ def test_a_bad_bounds_file_is_refused(tmp_path: Path) -> None:
 def test_a_bounds_file_that_is_not_there_is_refused_and_nothing_is_made(tmp_path: Path) -> None:
     missing = tmp_path / "labs" / "typo.toml"
     missing.parent.mkdir()
-    with pytest.raises(ConfigError, match="cannot be read"):
+    with pytest.raises(ConfigError, match="there is no bounds file"):
         RobotTask(orders(tmp_path, bounds=str(missing)))
     assert list(missing.parent.iterdir()) == []
 
@@ -135,14 +135,33 @@ def test_a_start_pose_outside_the_workspace_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("kuka", "expected franka, panda, or MODULE:CLASS"),
-        (f"{EXAMPLES / 'stage.py'}:Stag", "no class 'Stag'"),
-        (f"{EXAMPLES / 'stage.py'}:Slide", "cannot be made"),
+        ("kuka", "no robot 'kuka'"),
+        ("kuka:", "no robot 'kuka:'"),
+        (":Kuka", "no robot ':Kuka'"),
+        ("kuka:Kuka", "no file kuka.py in .* and no module 'kuka'"),
         (f"{EXAMPLES / 'none.py'}:Stage", "no file"),
+        (f"{EXAMPLES / 'stage.py'}:Stag", "no class 'Stag'"),
+    ],
+)
+def test_a_robot_that_nobody_can_find_is_refused_with_the_names_of_those_there_are(
+    name: str, why: str
+) -> None:
+    with pytest.raises(
+        ConfigError, match=f"{why}.*: expected franka, panda or MODULE:CLASS"
+    ) as refused:
+        load_port(name)
+    assert "keylock" not in str(refused.value), "tasks are no robots"
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        (f"{EXAMPLES / 'stage.py'}:Slide", "cannot be made"),
         ("queue:SimpleQueue", "it lacks joints, engine"),
     ],
 )
-def test_a_robot_that_is_none_is_refused(name: str, why: str) -> None:
+def test_a_class_that_is_no_robot_is_refused(name: str, why: str) -> None:
     with pytest.raises(ConfigError, match=why):
         load_port(name)
 

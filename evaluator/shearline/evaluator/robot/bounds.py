@@ -190,8 +190,14 @@ def read_bounds(path: Path) -> Bounds:
     """
     try:
         text = path.read_text()
-    except (OSError, UnicodeDecodeError) as fault:
-        raise BoundsError(f"the bounds file {path} cannot be read: {fault}") from None
+    except FileNotFoundError:
+        raise BoundsError(
+            f"there is no bounds file {path}: copy docs/examples/lab.toml and put your numbers in"
+        ) from None
+    except OSError as fault:
+        raise BoundsError(f"the bounds file {path} cannot be read: {fault.strerror}") from None
+    except UnicodeDecodeError:
+        raise BoundsError(f"the bounds file {path} is no text: expected TOML") from None
     try:
         return parse_bounds(text)
     except BoundsError as fault:

@@ -33,8 +33,9 @@ def load_port(name: str, address: str = "") -> RobotPort:
         ConfigError: If there is no such class, it is no port, or what it needs is not installed.
     """
     where, colon, called = name.partition(":")
-    if colon:
-        module = import_code(where)[0]
+    expected = f"{', '.join(BUILTIN)} or MODULE:CLASS for your own"
+    if colon and where and called:
+        module = import_code(where, expected)[0]
     elif name in BUILTIN:
         where, called, package = BUILTIN[name]
         try:
@@ -44,11 +45,10 @@ def load_port(name: str, address: str = "") -> RobotPort:
                 f"robot {name!r} needs {missing.name}: install {package} on this computer"
             ) from None
     else:
-        known = ", ".join(BUILTIN)
-        raise ConfigError(f"no robot {name!r}: expected {known}, or MODULE:CLASS for your own")
+        raise ConfigError(f"no robot {name!r}: expected {expected}")
     made = getattr(module, called, None)
     if not isinstance(made, type):
-        raise ConfigError(f"no class {called!r} in {where}: correct --robot")
+        raise ConfigError(f"no class {called!r} in {where}: expected {expected}")
     try:
         port = made(address) if address else made()
     except TypeError as fault:
