@@ -26,6 +26,11 @@ from shearline.sims.scene import KEY_TURN, TIP_M, believed_lock_pose
 
 WAIT_S = 60.0
 
+#: The example's canary, which opens the emulated lock through both clients.
+CANARY = "\n".join(
+    f"{name} = {value!r}" for name, value in read_bounds(EXAMPLES / "lab.toml").canary.theta.items()
+)
+
 #: The lab of the emulated Frankas; the key as the simulation has it.
 FRANKA_LAB = f"""
 [tool]
@@ -38,14 +43,7 @@ tau_ext_nm = [40.0, 40.0, 40.0, 40.0, 11.9, 11.9, 11.9]
 lowest_m = [0.2, -0.3, 0.05]
 highest_m = [0.8, 0.3, 0.6]
 [canary.theta]
-app_tilt_x = 0.0
-app_tilt_y = 0.0
-app_off_x = 0.0
-app_off_y = 0.0
-ins_push = 15.0
-con_force = 4.0
-wig_a_x = 4.0
-wig_a_y = 4.0
+{CANARY}
 """
 
 
