@@ -28,6 +28,7 @@ class Led(Franka):
         super().__init__(client, address)
         self._where = (address, LEAD)
         self._lead: socket.socket | None = None
+        self._seen_ms = -1
 
     def sample(self) -> Sample:
         """Look, and let the robot go on."""
@@ -49,6 +50,9 @@ class Led(Franka):
             self._lead = None
 
     def _say(self, seen_ms: int) -> None:
+        if seen_ms == self._seen_ms:
+            return
+        self._seen_ms = seen_ms
         if self._lead is None:
             self._lead = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self._lead.connect(self._where)

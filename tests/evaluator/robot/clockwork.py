@@ -25,6 +25,8 @@ class Clockwork:
         lie: Changes each pose before it is told.
     """
 
+    turning = 1.0
+
     def __init__(self) -> None:
         self.felt, self.pose = np.full(13, 0.1), np.eye(4)
         self.aims: list[Array] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,16 @@ from hypothesis import strategies as st
 
 from shearline.evaluator.robot.client import COLUMNS, Drive, beyond
 from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotRefused
-from shearline.evaluator.robot.free import STIFFNESS, free_motion
+from shearline.evaluator.robot.free import (
+    DAMPING,
+    GAIN_MPS2,
+    GAIN_RADPS2,
+    MASS,
+    STIFFNESS,
+    free_motion,
+    lead,
+)
+from shearline.evaluator.robot.path import off, turned
 from shearline.evaluator.robot.port import Array
 
 
@@ -147,4 +157,31 @@ def test_a_free_motion_pushes_no_harder_than_the_lab_allows_and_outruns_no_clip(
     x_m = [line.at(t)[0, 3] for t in t_s]
     speed = np.max(np.diff(x_m)) / (t_s[1] - t_s[0])
     assert speed <= speed_mps
-    assert 2.0 * np.sqrt(STIFFNESS[0]) * speed <= STIFFNESS[0] * free.clip_m
+    assert DAMPING[0] * speed <= STIFFNESS[0] * free.clip_m
+
+
+@pytest.mark.parametrize(("far_m", "turn_rad"), [(0.012, 0.02), (0.1, 0.0), (0.0, 0.3)])
+def test_an_arm_of_the_mass_that_is_reckoned_with_stays_on_its_line(
+    far_m: float, turn_rad: float
+) -> None:
+    end = goal(far_m)
+    end[:3, :3] = turned(np.array([0.0, 0.6, 0.8]), turn_rad)
+    line, _ = free_motion(np.eye(4), end, 0.1, limits())
+    at, speed, dt_s = np.zeros(6), np.zeros(6), 2e-3
+    for tick in range(math.ceil(line.length_s / dt_s)):
+        wanted = off(np.eye(4), line.at(tick * dt_s))
+        assert np.abs(wanted - at)[:3].max() < 2e-4
+        assert np.abs(wanted - at)[3:].max() < 2e-3
+        pull = STIFFNESS * (wanted + lead(line, tick * dt_s, turning=1.0) - at)
+        speed = speed + dt_s * (pull - DAMPING * speed) / MASS
+        at = at + dt_s * speed
+
+
+@given(st.floats(0.001, 0.2), st.floats(0.0, 0.5))
+def test_a_free_motion_gains_speed_no_faster_than_it_may(far_m: float, turn_rad: float) -> None:
+    end = goal(far_m)
+    end[:3, :3] = turned(np.array([1.0, 0.0, 0.0]), turn_rad)
+    line, _ = free_motion(np.eye(4), end, 0.25, limits())
+    gains = np.array([line.rates(t)[1] for t in np.linspace(0.0, line.length_s, 100)])
+    assert np.linalg.norm(gains[:, :3], axis=1).max() <= GAIN_MPS2 * (1.0 + 1e-9)
+    assert np.linalg.norm(gains[:, 3:], axis=1).max() <= GAIN_RADPS2 * (1.0 + 1e-9)

@@ -80,7 +80,13 @@ class Drive:
 
 
 class Client(Protocol):
-    """A client library, as far as it is needed; all rows are raw, see :func:`row_of`."""
+    """A client library, as far as it is needed; all rows are raw, see :func:`row_of`.
+
+    Attributes:
+        turning: How much more than it was told to it brakes turning.
+    """
+
+    turning: float
 
     def connect(self, address: str) -> str:
         """Connect and return what the robot is; raises :class:`RobotError`."""

@@ -34,7 +34,7 @@ from shearline.evaluator.robot.errors import (
     RobotRefused,
     RobotUnreachable,
 )
-from shearline.evaluator.robot.free import ARRIVED_RADPS, arrived, free_motion
+from shearline.evaluator.robot.free import ARRIVED_RADPS, arrived, free_motion, lead
 from shearline.evaluator.robot.path import Line, off, shifted
 from shearline.evaluator.robot.port import (
     TARE_SHARE,
@@ -262,11 +262,12 @@ class Franka:
         session.end()
 
     def _follow(self, session: Session, line: Line, goal: Array) -> None:
-        """Lead the reference along a line, and then by what is missing, until the arm is there."""
+        """Lead the arm along a line, and then by what is missing, until it is there."""
         at_s, shift = 0.0, np.zeros(6)
         before = self.sample()
         while True:
-            session.ref(shifted(line.at(at_s), shift))
+            ahead = lead(line, at_s, self._client.turning)
+            session.ref(shifted(line.at(at_s), shift + ahead))
             now = self._after(before.t_s + REFERENCE_S)
             at_s += min(now.t_s - before.t_s, 2.0 * REFERENCE_S)
             before = now

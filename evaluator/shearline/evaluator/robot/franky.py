@@ -65,6 +65,8 @@ class FrankyPort(Franka):
 class FrankyClient:
     """franky, as far as :class:`Franka` needs it."""
 
+    turning = 1.0
+
     def __init__(self) -> None:
         self._franky: ModuleType | None = None
         self._robot: Any = None

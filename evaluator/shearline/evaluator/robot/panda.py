@@ -90,6 +90,8 @@ class PandaPort(Franka):
 class PandaClient:
     """panda-python, as far as :class:`Franka` needs it."""
 
+    turning = math.sqrt(2.0)  # it brakes by the root of a stiffness that is given twice
+
     def __init__(self, hang_s: float) -> None:
         self._hang_s = hang_s
         self._address = ""

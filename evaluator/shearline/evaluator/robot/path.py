@@ -13,6 +13,9 @@ from shearline.sims.scene import quaternion as w_first
 #: Peak of the rate of s(u) = 10 u^3 - 15 u^4 + 6 u^5, the polynomial of least jerk.
 PEAK_RATE = 1.875
 
+#: Peak of its second derivative.
+PEAK_GAIN = 10.0 / math.sqrt(3.0)
+
 #: The arm follows its reference with some overshoot; it must not exceed the speed asked for.
 SPEED_SHARE = 0.85
 
@@ -28,20 +31,29 @@ class Line:
         end: Pose ``(4, 4)``.
         speed_mps: Largest speed of the tip.
         speed_radps: Largest speed of turning.
+        gain_mps2: Largest acceleration of the tip.
+        gain_radps2: Largest acceleration of turning.
 
     Attributes:
         length_s: How long it takes [s].
     """
 
     def __init__(
-        self, begin: Array, end: Array, speed_mps: float, speed_radps: float = math.inf
+        self,
+        begin: Array,
+        end: Array,
+        speed_mps: float,
+        speed_radps: float = math.inf,
+        gain_mps2: float = math.inf,
+        gain_radps2: float = math.inf,
     ) -> None:
         self._begin, self._end = begin, end
         off_m, off_rad = apart(begin, end)
         self._turn = off_rad
         self._axis = axis(begin[:3, :3].T @ end[:3, :3])
         turning_s = off_rad / min(speed_mps / LEVER_M, speed_radps)
-        self.length_s = PEAK_RATE * max(off_m / speed_mps, turning_s) / SPEED_SHARE
+        gaining_s = math.sqrt(PEAK_GAIN * max(off_m / gain_mps2, off_rad / gain_radps2))
+        self.length_s = max(PEAK_RATE * max(off_m / speed_mps, turning_s) / SPEED_SHARE, gaining_s)
 
     def at(self, t_s: float) -> Array:
         """Return the pose at a time from the beginning [s]."""
@@ -53,6 +65,17 @@ class Line:
         pose[:3, :3] = self._begin[:3, :3] @ turned(self._axis, share * self._turn)
         pose[:3, 3] = self._begin[:3, 3] + share * (self._end[:3, 3] - self._begin[:3, 3])
         return pose
+
+    def rates(self, t_s: float) -> tuple[Array, Array]:
+        """Return speeds and accelerations at that time ``(6,)``, base frame [m/s, m/s^2, rad..]."""
+        if t_s >= self.length_s:
+            return np.zeros(6), np.zeros(6)
+        u = t_s / self.length_s
+        turn = self._turn * (self._begin[:3, :3] @ self._axis)
+        way = np.concatenate([self._end[:3, 3] - self._begin[:3, 3], turn])
+        speed = 30.0 * u**2 * (1.0 - u) ** 2 / self.length_s
+        gain = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / self.length_s**2
+        return speed * way, gain * way
 
 
 def axis(rotation: Array) -> Array:
