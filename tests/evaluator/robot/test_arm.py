@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from evaluator.robot.rig import Rig, Spy, attempt, bounds, stage, theta
+from evaluator.robot.rig import Rig, Spy, answering, attempt, bounds, stage, theta
 
 from shearline.evaluator.robot import pipe
 from shearline.evaluator.robot.peer import Gone
@@ -118,8 +118,8 @@ def test_key_and_lock_are_worn_after_their_insertions(rig: Make) -> None:
     lab = bounds(wear=msgspec.structs.replace(bounds().wear, key_insertions=2))
     arm = rig(lab=lab).armed()  # the rehearsal is the first
     assert arm.run(attempt(1)).result.kind is OutcomeKind.SUCCESS
+    assert (arm.state, arm.takes()) == (State.WORN, False)
     assert "peg-1 has done 2 insertions of 2" in arm.run(attempt(2)).result.why
-    assert arm.state is State.WORN
     arm.type("recover", "confirm")
     assert arm.state == State.WORN
     arm.type("replaced key")
@@ -127,26 +127,91 @@ def test_key_and_lock_are_worn_after_their_insertions(rig: Make) -> None:
     assert arm.store.wear().insertions == {"peg-1": 1, "hole-1": 3}
 
 
-def test_a_canary_is_tried_every_so_many_trials_and_told_to_no_learner(rig: Make) -> None:
-    lab = bounds(canary=msgspec.structs.replace(bounds().canary, every=2))
-    arm = rig(lab=lab).armed()
-    for number in range(3):
-        arm.run(attempt(number))
-    answers = [said for said in arm.said if isinstance(said, pipe.Answer)]
-    assert len(answers) == 3
+def canaries(arm: Rig) -> list[str]:
+    """Return how each canary ended, as the diary has it."""
     diary = (arm.store.folder / "diary.jsonl").read_text().splitlines()
-    canaries = [entry for line in diary if (entry := json.loads(line))["what"] == "canary"]
-    assert [entry["verdict"] for entry in canaries] == ["success"]
+    entries = [json.loads(line) for line in diary]
+    return [entry["verdict"] for entry in entries if entry["what"] == "canary"]
+
+
+def every(trials: int) -> Any:
+    """Return bounds with a canary after so many trials."""
+    return bounds(canary=msgspec.structs.replace(bounds().canary, every=trials))
+
+
+def test_a_canary_is_tried_every_so_many_trials_and_told_to_no_learner(rig: Make) -> None:
+    arm = rig(lab=every(2)).armed()
+    for number in range(5):
+        assert arm.run(attempt(number)).result.kind is OutcomeKind.SUCCESS
+    answers = [said for said in arm.said if isinstance(said, pipe.Answer)]
+    assert len(answers) == 5
+    assert canaries(arm) == ["success", "success"]
+
+
+def test_a_canary_runs_after_the_answer_and_the_worker_hears_before_it_that_no_trial_may_come(
+    rig: Make,
+) -> None:
+    arm = rig(lab=every(1)).armed()
+    arm.said.clear()
+    arm.run(attempt())
+    kinds = [said.takes if isinstance(said, pipe.Stands) else "answer" for said in arm.said]
+    at = kinds.index("answer")
+    assert kinds[at - 1 : at + 2] == [False, "answer", False], "the canary's approach comes last"
+    assert kinds[-1] is True
+    assert arm.run(attempt(1)).result.kind is OutcomeKind.SUCCESS, "who came all the same"
 
 
 def test_a_canary_that_fails_again_and_again_means_worn(rig: Make) -> None:
-    lab = bounds(canary=msgspec.structs.replace(bounds().canary, every=1))
-    arm = rig(lab=lab).armed()
+    arm = rig(lab=every(1)).armed()
     arm.port.slide.resistance = lambda at, _speed: np.array([0, 0, -5e4 * max(at[2], 0.0)])  # type: ignore[attr-defined]
-    answer = arm.run(attempt())
-    assert answer.result.kind is OutcomeKind.ABORTED
-    assert arm.state is State.WORN
+    assert arm.run(attempt()).result.kind is OutcomeKind.FAILURE, "the trial's own verdict"
+    assert (arm.state, arm.takes()) == (State.WORN, False)
     assert "the canary failed" in arm.printed
+    assert len(canaries(arm)) == 2
+    answer = arm.run(attempt(1))
+    assert (answer.result.kind, arm.state) == (OutcomeKind.ABORTED, State.WORN)
+
+
+def test_a_canary_without_a_verdict_is_tried_again_and_then_a_fault(
+    rig: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm = rig(lab=every(1)).armed()
+
+    def lacking(*_: object) -> int:
+        return 3 if any(isinstance(said, pipe.Answer) for said in arm.said) else 0
+
+    monkeypatch.setattr("shearline.evaluator.robot.motions.missing", lacking)
+    arm.run(attempt())
+    assert arm.state is State.FAULT
+    assert canaries(arm) == ["the robot's log lacks 3 cycles of the contact"] * 2
+
+
+def test_nothing_is_tried_when_the_worker_wants_to_leave(rig: Make) -> None:
+    spy = Spy()
+    arm = rig(spy, lab=every(1)).armed()
+    spy.interfere = lambda _stage, _what: setattr(arm.arm.peer, "leaving", "the run has ended")
+    arm.run(attempt())
+    assert canaries(arm) == []
+    assert arm.state is State.READY
+
+
+def test_a_canary_waits_while_the_learner_holds(rig: Make) -> None:
+    arm = rig(lab=every(1)).armed()
+    arm.arm.peer.held = True
+    arm.run(attempt())
+    assert (arm.state, canaries(arm)) == (State.PAUSED, [])
+    arm.arm.peer.held = False
+    arm.tick()
+    assert (arm.state, canaries(arm), arm.takes()) == (State.READY, ["success"], True)
+
+
+def test_in_step_mode_the_operator_is_asked_for_the_canary_too(rig: Make) -> None:
+    arm = rig(lab=every(1), step=True).armed()
+    for _ in range(2):
+        arm.inbox.put(answering("go"))
+    assert arm.run(attempt()).result.kind is OutcomeKind.SUCCESS
+    assert canaries(arm) == ["success"]
+    assert "the canary: type 'go'" in arm.printed
 
 
 # -- the worker ----------------------------------------------------------------------------------

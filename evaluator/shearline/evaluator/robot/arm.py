@@ -131,6 +131,7 @@ class Arm(Mover):
             self._enter(Cause.PAUSE, "no trial is taken")
         elif not held and self.state is State.PAUSED:
             self._enter(Cause.RESUME, "trials are taken again")
+        self._care()
 
     # -- the operator ----------------------------------------------------------------------------
 
@@ -245,21 +246,21 @@ class Arm(Mover):
         theta = np.array(asked.trial.theta)
         if why := self._bounds.objection(theta):
             return Ran(OutcomeKind.REJECTED, why)
-        if self.state is State.READY and self._step and not self._granted(asked):
-            return Ran(OutcomeKind.ABORTED, "the operator did not grant this trial")
-        self._care()
-        if self.state is not State.READY or not self._rehearsed:
-            why = f"the arm is {self.state} and waits for its operator: {self._why}"
+        owed = self._owed()
+        if self.state is not State.READY or not self._rehearsed or owed:
+            why = f"the arm is {self.state} and waits for its operator: {owed or self._why}"
             return Ran(OutcomeKind.ABORTED, why)
+        if self._step and not self._granted(f"trial {asked.trial.trial}"):
+            return Ran(OutcomeKind.ABORTED, "the operator did not grant this trial")
         return self._perform(self._work(theta, 1.0))
 
-    def _granted(self, asked: pipe.Try) -> bool:
+    def _granted(self, what: str) -> bool:
         """Ask for one trial in ``--step``; anything but 'go' is a no.
 
         Raises:
             MotionEnded: If the robot stopped, or somebody leads it, meanwhile.
         """
-        self._ask(f"trial {asked.trial.trial}: type 'go' to run it, anything else to skip")
+        self._ask(f"{what}: type 'go' to run it, anything else to skip")
         while not (self.peer.halt_why or self.peer.leaving):
             self.alive()
             self._must_be_left()
@@ -293,27 +294,38 @@ class Arm(Mover):
             self._prompt()
             return
         self._rehearsed = True
+        self._store.set_wear(self._store.wear().tested())  # it was the canary's tuple
         self._tell("ready for trials")
 
     def _care(self) -> None:
-        """See to wear and canary before a trial; may leave READY."""
-        wear, canary = self._store.wear(), self._bounds.canary
-        if self.state is not State.READY or not self._rehearsed:
+        """See to wear and canary between trials; may leave READY.
+
+        Since that is owed no trial is taken, and the worker heard so before the last answer: no
+        attempt's deadline runs meanwhile. One that comes all the same waits its turn.
+        """
+        resting = self.state is State.READY and self._rehearsed and not self.peer.leaving
+        if not resting or not self._owed():
             return
         if why := worn(self._store.wear(), self._bounds.wear):
             self._enter(Cause.WEAR, why)
-        elif wear.since_canary >= canary.every:
+        elif not self._step or self._granted("the canary"):
             self._try_canary()
 
     def _try_canary(self) -> None:
         """Try what is known to work; key and lock are worn when it fails again and again."""
-        for _ in range(CANARIES):
+        for again in range(CANARIES):
+            self._terminal.say("the canary once more" if again else "the canary's turn")
             ran = self._perform(self._work(self._bounds.canary_tuple(), 1.0))
-            if self.state is not State.READY or not ran.is_judged:
+            if self.state is not State.READY or self.peer.leaving:
                 return
-            cost = self._task.cost(ran.report, self._bounds)
-            self._store.note("canary", verdict=self._task.verdict(ran.report), cost=cost)
+            cost = self._task.cost(ran.report, self._bounds) if ran.is_judged else None
+            verdict = ran.why or self._task.verdict(ran.report)
+            self._store.note("canary", verdict=verdict, cost=cost)
             if ran.kind is OutcomeKind.SUCCESS:
                 self._store.set_wear(self._store.wear().tested())
+                self._tell("the canary works: trials are taken again")
                 return
-        self._enter(Cause.WEAR, f"the canary failed {CANARIES} times: look at key and lock")
+        if ran.is_judged:
+            self._enter(Cause.WEAR, f"the canary failed {CANARIES} times: look at key and lock")
+        else:
+            self._break(MotionEnded(Ending.INVALID, f"the canary has no verdict: {ran.why}"))

@@ -22,7 +22,7 @@ from shearline.evaluator.robot.peer import Peer
 from shearline.evaluator.robot.port import Array, Mode, RobotPort
 from shearline.evaluator.robot.results import Ran, Task
 from shearline.evaluator.robot.states import MOVING, STUCK, Cause, Link, State, advance
-from shearline.evaluator.robot.store import Store
+from shearline.evaluator.robot.store import Store, worn
 from shearline.evaluator.robot.terminal import Terminal, prompt
 from shearline.evaluator.robot.trial import Insertion, Report, Work, must_be_free, to_start
 from shearline.evaluator.robot.watch import Halted, Watch
@@ -217,8 +217,18 @@ class Mover:
         self._tell(why)
 
     def _tell(self, why: str) -> None:
-        takes = self._rehearsed and self.state in _WORKING
+        takes = self._rehearsed and self.state in _WORKING and not self._owed()
         self._say(pipe.Stands(state=self.state, why=why, engine=self.engine, takes=takes))
+
+    def _owed(self) -> str:
+        """Say what key and lock need before another trial, or ``""``."""
+        try:
+            wear = self._store.wear()
+        except RobotError as damaged:
+            return str(damaged)
+        if why := worn(wear, self._bounds.wear):
+            return why
+        return "the canary is due" if wear.since_canary >= self._bounds.canary.every else ""
 
     def _prompt(self) -> None:
         key_in_lock, rehearsed = self._store.key_in_lock, self._rehearsed
