@@ -10,7 +10,7 @@ import numpy as np
 from shearline.evaluator.robot.client import JOINTS, Drive, row_of
 from shearline.evaluator.robot.errors import MotionEnded
 from shearline.evaluator.robot.franka import Franka
-from shearline.evaluator.robot.port import Array, Guard, Mode, Tool
+from shearline.evaluator.robot.port import Array, Clip, Contact, Guard, Mode, Tool
 
 
 class Clockwork:
@@ -48,6 +48,9 @@ class Clockwork:
 
     def read(self) -> tuple[Array, Mode, tuple[str, ...]]:
         return self._row(), Mode.IDLE, ()
+
+    def clip(self, contact: Contact) -> Clip:
+        return Clip(contact.o_r_c, contact.clip_m, contact.clip_rad)
 
     def begin(self, drive: Drive) -> None:
         self.drives.append(drive)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -12,8 +13,10 @@ from evaluator.robot.clockwork import Clockwork, limits, port
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shearline.evaluator.robot.client import COLUMNS, Drive, beyond
+from shearline.evaluator.robot.client import COLUMNS, Client, Drive, beyond
 from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotRefused
+from shearline.evaluator.robot.frames import rpy
+from shearline.evaluator.robot.franky import FrankyClient
 from shearline.evaluator.robot.free import (
     DAMPING,
     GAIN_MPS2,
@@ -23,6 +26,7 @@ from shearline.evaluator.robot.free import (
     free_motion,
     lead,
 )
+from shearline.evaluator.robot.panda import PandaClient
 from shearline.evaluator.robot.path import off, turned
 from shearline.evaluator.robot.port import Array
 
@@ -185,3 +189,21 @@ def test_a_free_motion_gains_speed_no_faster_than_it_may(far_m: float, turn_rad:
     gains = np.array([line.rates(t)[1] for t in np.linspace(0.0, line.length_s, 100)])
     assert np.linalg.norm(gains[:, :3], axis=1).max() <= GAIN_MPS2 * (1.0 + 1e-9)
     assert np.linalg.norm(gains[:, 3:], axis=1).max() <= GAIN_RADPS2 * (1.0 + 1e-9)
+
+
+# -- the clip -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("client", [FrankyClient(), PandaClient(1.0)], ids=["fr3", "panda"])
+@given(st.tuples(*[st.floats(-1.5, 1.5)] * 3))
+def test_no_client_pulls_harder_than_the_clip_along_any_axis_of_the_lock(
+    client: Client, turn: tuple[float, ...]
+) -> None:
+    asked = replace(contact(1.0), o_r_c=rpy(turn))
+    clip = client.clip(asked)
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    pulled = corners @ clip.o_r.T @ asked.o_r_c  # where the error may be, along the lock's axes
+    assert np.abs(pulled).max() * clip.m <= asked.clip_m * (1.0 + 1e-9)
+    assert np.abs(pulled).max() * clip.rad <= asked.clip_rad * (1.0 + 1e-9)
+    along_base = client.clip(replace(asked, o_r_c=np.eye(3)))
+    assert (along_base.m, along_base.rad) == (asked.clip_m, asked.clip_rad)

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shearline.evaluator.robot.frames import in_lock, is_pose
+from shearline.evaluator.robot.port import Clip
 from shearline.evaluator.robot.reference import (
     Reference,
     contact_of,
@@ -82,6 +83,20 @@ def test_what_the_clip_takes_away_is_counted(axis: int, within: float, beyond: f
         reference.begin(target[:3], target[3:])  # there already: no speed is in the way
         reference.toward(target, np.zeros(3), np.zeros(3), DT_S)
     assert reference.clipped_share == pytest.approx(0.5)
+
+
+@given(st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.tuples(*[st.floats(-0.02, 0.02)] * 3))
+def test_on_a_turned_lock_what_is_counted_is_what_the_robot_clips_along_its_own_axes(
+    turn: tuple[float, ...], asked_m: tuple[float, ...]
+) -> None:
+    o_t_lock = in_lock(np.eye(4), (0.0, 0.0, 0.0), turn)
+    reference, clip = Reference(bounds(), 1.0), Clip(np.eye(3), 0.01, 0.02)
+    reference.reckon_with(clip, o_t_lock)
+    target = np.array([*asked_m, 0.0, 0.0, 0.0])
+    reference.begin(target[:3], target[3:])
+    reference.toward(target, np.zeros(3), np.zeros(3), DT_S)
+    in_base_m = o_t_lock[:3, :3] @ asked_m
+    assert reference.clipped_share == float((np.abs(in_base_m) > clip.m).any())
 
 
 @pytest.mark.parametrize(("axis", "speed"), [(0, 0.2), (4, 1.0)], ids=["m/s", "rad/s"])

@@ -15,6 +15,7 @@ from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotRefused
 from shearline.evaluator.robot.frames import inverse
 from shearline.evaluator.robot.port import (
     Array,
+    Clip,
     Contact,
     Guard,
     Mode,
@@ -106,6 +107,10 @@ class Client(Protocol):
 
     def read(self) -> tuple[Array, Mode, tuple[str, ...]]:
         """Read a state between motions; blocks until the robot sends one."""
+        ...
+
+    def clip(self, contact: Contact) -> Clip:
+        """Return what it will clip with."""
         ...
 
     def begin(self, drive: Drive) -> None:

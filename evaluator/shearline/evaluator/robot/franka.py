@@ -214,7 +214,7 @@ class Franka:
         self._expect_ready()
         assert self._guard is not None
         drive = Drive(contact, self._guard, self._tare)
-        session = self._session = Session(self, self._client)
+        session = self._session = Session(self, self._client, self._client.clip(contact))
         try:
             self._client.begin(drive)
         except BaseException:

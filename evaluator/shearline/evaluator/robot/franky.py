@@ -33,7 +33,7 @@ from shearline.evaluator.robot.client import (
 )
 from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotRefused, RobotUnreachable
 from shearline.evaluator.robot.franka import Franka
-from shearline.evaluator.robot.port import Array, Contact, Mode, Tool
+from shearline.evaluator.robot.port import Array, Clip, Contact, Mode, Tool
 
 #: A contact that ends by itself has this long to brake; within the port's grace [s].
 BRAKE_S = 0.02
@@ -140,15 +140,20 @@ class FrankyClient:
 
     # -- the motion -------------------------------------------------------------------------------
 
+    def clip(self, contact: Contact) -> Clip:
+        """Return what the tracker will clip with: along the axes of the base."""
+        share = clip_in_base(contact.o_r_c)
+        return Clip(np.eye(3), share * contact.clip_m, share * contact.clip_rad)
+
     def begin(self, drive: Drive) -> None:
         """Start the tracker."""
         franky, contact = self._franky, drive.contact
         assert franky is not None
         state = self._robot.state
-        clip = clip_in_base(contact.o_r_c)
+        clip = self.clip(contact)
         motion = franky.CartesianImpedanceTrackingMotion(
-            translational_error_clip=np.full(3, clip * contact.clip_m),
-            rotational_error_clip=np.full(3, clip * contact.clip_rad),
+            translational_error_clip=np.full(3, clip.m),
+            rotational_error_clip=np.full(3, clip.rad),
             posture_task=franky.PostureTask(np.array(state.q), POSTURE),
             gains_time_constant=GAINS_S,
         )

@@ -47,7 +47,7 @@ from shearline.evaluator.robot.client import (
 from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotRefused, RobotUnreachable
 from shearline.evaluator.robot.franka import Franka
 from shearline.evaluator.robot.path import clipped, quaternion
-from shearline.evaluator.robot.port import Array, Contact, Mode, Tool
+from shearline.evaluator.robot.port import Array, Clip, Contact, Mode, Tool
 
 #: Between two looks at the newest state [s].
 LOOK_S = 5e-3
@@ -168,6 +168,10 @@ class PandaClient:
         return _row(state), mode_of(state), errors_of(state)
 
     # -- the motion -------------------------------------------------------------------------------
+
+    def clip(self, contact: Contact) -> Clip:
+        """Return what the reference is clipped with."""
+        return Clip(contact.o_r_c, contact.clip_m, contact.clip_rad)
 
     def begin(self, drive: Drive) -> None:
         """Start the controller; never of a robot that is not ready, for the library recovers it."""

@@ -139,6 +139,21 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True)
+class Clip:
+    """Along which axes a position error is clipped, and where.
+
+    Attributes:
+        o_r: These axes in the base frame, as columns ``(3, 3)``.
+        m: Largest position error along each of them that pulls [m].
+        rad: Largest rotation error about each of them that pulls [rad].
+    """
+
+    o_r: Array
+    m: float
+    rad: float
+
+
+@dataclass(frozen=True, slots=True)
 class Consent:
     """A local operator's word; only the prompt at the robot's own terminal makes one.
 
@@ -155,7 +170,11 @@ class Consent:
 
 @runtime_checkable
 class ContactSession(Protocol):
-    """A running contact; ends by :meth:`end`, by its time, by the guard or by a fault."""
+    """A running contact; ends by :meth:`end`, by its time, by the guard or by a fault.
+
+    A session whose controller clips along other axes than those of the compliance frame, and thus
+    earlier, says so with an attribute ``clip``; see :func:`clip_of`.
+    """
 
     def ref(self, o_t_ee: Array) -> None:
         """Set the reference pose of the tip ``(4, 4)``; returns at once.
@@ -289,6 +308,13 @@ class RobotPort(Protocol):
     def close(self) -> None:
         """Stop and let go of the connection; does nothing when closed. Never raises."""
         ...
+
+
+def clip_of(session: object, contact: Contact) -> Clip:
+    """Return what a session truly clips with: its own ``clip``, or else what it was told."""
+    told = Clip(contact.o_r_c, contact.clip_m, contact.clip_rad)
+    own: Clip = getattr(session, "clip", told)
+    return own
 
 
 def log_columns(joints: int) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from shearline.evaluator.robot.bounds import Bounds
 from shearline.evaluator.robot.frames import in_lock
-from shearline.evaluator.robot.port import Array, Contact
+from shearline.evaluator.robot.port import Array, Clip, Contact
 from shearline.evaluator.skill.control import DESIGN_MASS
 from shearline.evaluator.skill.manipulation import AXIAL_K, Command
 
@@ -82,11 +82,17 @@ class Reference:
 
     def __init__(self, bounds: Bounds, pace: float) -> None:
         limits = bounds.contact
+        self._axes = np.eye(3)
         self._speed = np.array([limits.reference_mps] * 3 + [limits.reference_radps] * 3) * pace
         self._clip = np.array([limits.clip_m] * 3 + [limits.clip_rad] * 3)
         self._at = np.zeros(6)
         self.ticks = 0
         self.clipped = 0
+
+    def reckon_with(self, clip: Clip, o_t_lock: Array) -> None:
+        """Count by what a contact truly clips with, not by the lab's clip along the lock's axes."""
+        self._axes = o_t_lock[:3, :3].T @ clip.o_r
+        self._clip = np.array([clip.m] * 3 + [clip.rad] * 3)
 
     def begin(self, tip: Array, turn: Array) -> None:
         """Start where the tip ``(3,)`` and its turn ``(3,)`` are."""
@@ -102,7 +108,8 @@ class Reference:
             dt_s: Time since the last step [s].
         """
         off = target - self._at
-        cut = bool((np.abs(target - np.concatenate([tip, turn])) > self._clip).any())
+        error = (target - np.concatenate([tip, turn])).reshape(2, 3) @ self._axes
+        cut = bool((np.abs(error.ravel()) > self._clip).any())
         for part, speed in ((slice(0, 3), self._speed[0]), (slice(3, 6), self._speed[3])):
             length = float(np.linalg.norm(off[part]))
             if length > speed * dt_s:

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from shearline.evaluator.robot.client import Client
 from shearline.evaluator.robot.errors import Ending, MotionEnded
-from shearline.evaluator.robot.port import Array
+from shearline.evaluator.robot.port import Array, Clip
 
 
 class Latching(Protocol):
@@ -31,14 +31,16 @@ class Session:
     Args:
         port: Whose contact it is.
         client: Runs it.
+        clip: What it clips with.
 
     Attributes:
         over: Whether the end of the motion has been seen.
     """
 
-    def __init__(self, port: Latching, client: Client) -> None:
+    def __init__(self, port: Latching, client: Client, clip: Clip) -> None:
         self._port = port
         self._client = client
+        self.clip = clip
         self.over = False
 
     def ref(self, o_t_ee: Array) -> None:

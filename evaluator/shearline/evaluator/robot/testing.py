@@ -43,6 +43,7 @@ from shearline.evaluator.robot.port import (
     RobotPort,
     Sample,
     Tool,
+    clip_of,
     log_columns,
 )
 from shearline.evaluator.robot.watch import Watch
@@ -215,6 +216,16 @@ class RobotPortContract(ABC):
         start = port.sample().o_t_ee.copy()
         after = self.lift(port, REACH_M / 2)
         assert after.o_t_ee[2, 3] - start[2, 3] == pytest.approx(REACH_M / 2, abs=1.5e-3)
+
+    def test_a_contact_pulls_no_harder_than_its_clip(self, port: RobotPort) -> None:
+        """Along no axis of the compliance frame, also where it clips along others."""
+        contact = self.contact(port.sample())
+        session = port.contact(contact)
+        clip = clip_of(session, contact)
+        session.end()
+        reach = float(np.abs(contact.o_r_c.T @ clip.o_r).sum(axis=1).max())
+        assert reach * clip.m <= contact.clip_m * (1.0 + 1e-6)
+        assert reach * clip.rad <= contact.clip_rad * (1.0 + 1e-6)
 
     def test_a_contact_goes_on_with_other_gains(self, port: RobotPort) -> None:
         """Softer and stiffer again, and the tip stays."""

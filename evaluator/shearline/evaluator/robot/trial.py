@@ -15,7 +15,7 @@ import numpy as np
 from shearline.evaluator.robot.bounds import Bounds
 from shearline.evaluator.robot.errors import Ending, MotionEnded
 from shearline.evaluator.robot.frames import apart, in_lock
-from shearline.evaluator.robot.port import Array, ContactSession, RobotPort
+from shearline.evaluator.robot.port import Array, ContactSession, RobotPort, clip_of
 from shearline.evaluator.robot.reference import (
     Reference,
     contact_of,
@@ -185,13 +185,13 @@ class Insertion:
         self._step(view, self._ticks(view))
         stiffness = stiffness_of(c)
         with self._watch.blocked():
-            session = self._port.contact(
-                contact_of(c, work.o_t_lock, work.bounds, work.bounds.contact.trial_s)
-            )
+            contact = contact_of(c, work.o_t_lock, work.bounds, work.bounds.contact.trial_s)
+            session = self._port.contact(contact)
         view = self._sight.view(self._watch.look())
         report.begun(view.t_s)
         self._due_s = view.t_s  # the skill's clock stands while the robot gets ready
         self._reference.begin(view.tip, view.turn)
+        self._reference.reckon_with(clip_of(session, contact), work.o_t_lock)
         try:
             while report.end.verdict == semantic.OPEN:
                 if not np.array_equal(stiffness_of(c), stiffness):
