@@ -11,6 +11,7 @@ from shearline.deploy.summary import print_summary
 CONFIRMED = {
     "claimed": 0.9, "trials": 40, "successes": 38, "success_rate": 0.95,
     "interval": [0.83, 0.99], "lost": 0, "mean_cost": 0.51, "bears_out": True,
+    "kinds": {},
 }  # fmt: skip
 REGION = {
     "centre": {"push": 12.0}, "radius": {"push": 1.7320508}, "success_low": 0.87,
@@ -49,6 +50,19 @@ def test_what_fresh_trials_came_to_stands_beside_what_was_claimed(
     text = printed(capsys, confirmation=CONFIRMED)
     assert "the recommended tuple succeeded in 38 of 40 fresh trials: 0.83 to 0.99 at 95 %" in text
     assert "which bears out the claim of at least 0.90; mean cost 0.510" in text
+
+
+@pytest.mark.parametrize(
+    ("kinds", "words"),
+    [
+        ({"robot": 40}, "in 38 of 40 fresh trials on robots: 0.83"),
+        ({"simulator": 28, "robot": 12}, "fresh trials (12 on robots, 28 on simulators): 0.83"),
+    ],
+)
+def test_who_confirmed_is_said(
+    capsys: pytest.CaptureFixture[str], kinds: dict[str, int], words: str
+) -> None:
+    assert words in printed(capsys, confirmation=CONFIRMED | {"kinds": kinds})
 
 
 def test_a_claim_that_is_contradicted_is_not_glossed_over(

@@ -133,9 +133,18 @@ def _spread(region: Mapping[str, Any] | None, name: str) -> str:
 def _confirmation(said: Mapping[str, Any], tried: str) -> str:
     low, high = said["interval"]
     lost = f", {said['lost']} lost" if said["lost"] else ""
+    where = _on(said.get("kinds", {})) + lost
     verdict = "which bears out" if said["bears_out"] else "which does NOT bear out"
     return (
         f"confirmed: {tried} succeeded in {said['successes']} of {said['trials']} fresh trials"
-        f"{lost}: {low:.2f} to {high:.2f} at 95 %,\n{verdict} the claim of at least"
+        f"{where}: {low:.2f} to {high:.2f} at 95 %,\n{verdict} the claim of at least"
         f" {said['claimed']:.2f}; mean cost {number(said['mean_cost'])}"
     )
+
+
+def _on(kinds: Mapping[str, int]) -> str:
+    """Say which kinds of evaluators ran trials, and how many each where there are several."""
+    if len(kinds) == 1:
+        return "".join(f" on {kind}s" for kind in kinds)
+    counts = ", ".join(f"{trials} on {kind}s" for kind, trials in sorted(kinds.items()))
+    return f" ({counts})" if counts else ""

@@ -65,6 +65,7 @@ def test_a_confirmation_counts_successes_and_their_costs() -> None:
     said = confirmed(lab.dispatcher.book, FOUND, Purpose.CONFIRMATION)
     assert said is not None
     assert (said.trials, said.successes, said.lost) == (3, 2, 0)
+    assert said.kinds == {"function": 3}
     assert said.interval == wilson(2, 3)
     assert said.claimed == 0.9
     assert said.mean_cost is not None

@@ -137,9 +137,10 @@ def write_messages(run_dir: Path) -> Write:
 def whole(write_run: Callable[..., Path], write_messages: Write) -> Path:
     """A finished run with everything that a report can show."""
     write_run(episodes=3, per_episode=8)
+    confirming = {"episode": 3, "purpose": Purpose.CONFIRMATION}
     fresh = [
-        _outcome(24, OutcomeKind.SUCCESS, episode=3, purpose=Purpose.CONFIRMATION),
-        _outcome(25, OutcomeKind.FAILURE, episode=3, purpose=Purpose.CONFIRMATION),
+        _outcome(24, OutcomeKind.SUCCESS, **confirming, evaluator_kind="robot"),
+        _outcome(25, OutcomeKind.FAILURE, **confirming, evaluator_kind="robot"),
     ]
     confirmation = {
         "claimed": 0.85,

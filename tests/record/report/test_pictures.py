@@ -92,7 +92,7 @@ def test_the_recommendation_says_value_range_region_and_chance(facts: Facts, see
     assert "probability 0.93 (95 % interval 85 to 100 %), cost about 0.41" in text
     assert "100 N m/rad" in text
     assert "± 113" in text
-    assert "tried 2 times on fresh noise: 1 succeeded (95 % interval 9 to 91 %)" in text
+    assert "tried 2 times on fresh noise, on robots: 1 succeeded (95 % interval 9 to 91 %)" in text
     assert "the claim of at least 85 % is borne out. Failed: trial 25." in text
     ends = [a["style"] for _, a in page.elements if a.get("class") == "region"]
     assert "left:0%;width:100%" in ends, "a spread beyond the bounds ends at them"

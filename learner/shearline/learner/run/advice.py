@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import statistics
+from collections import Counter
 
 import msgspec
 
@@ -60,6 +61,7 @@ class Confirmed(msgspec.Struct, frozen=True, kw_only=True):
         lost: Fresh trials without an outcome.
         mean_cost: Mean cost of the successes; ``None`` without any.
         bears_out: Whether the claim is no higher than the interval.
+        kinds: How many of the trials each kind of evaluator ran; as far as it is known.
     """
 
     claimed: float
@@ -70,6 +72,7 @@ class Confirmed(msgspec.Struct, frozen=True, kw_only=True):
     lost: int
     mean_cost: float | None
     bears_out: bool
+    kinds: dict[str, int]
 
 
 def advice(space: Space, found: Recommendation) -> Advice:
@@ -89,7 +92,8 @@ def confirmed(book: Book, found: Recommendation | None, purpose: Purpose) -> Con
     claimed = None if found is None else _claimed(found, purpose)
     if claimed is None or purpose not in book.purposes:
         return None
-    told = _confirmation(claimed, book.rows(book.purposes.index(purpose)))
+    rows = book.rows(book.purposes.index(purpose))
+    told = _confirmation(claimed, rows)
     return Confirmed(
         claimed=told.claimed,
         trials=told.trials,
@@ -99,6 +103,7 @@ def confirmed(book: Book, found: Recommendation | None, purpose: Purpose) -> Con
         lost=told.lost,
         mean_cost=told.mean_cost,
         bears_out=told.bears_out,
+        kinds=_kinds(book, rows),
     )
 
 
@@ -106,6 +111,11 @@ def _claimed(found: Recommendation, purpose: Purpose) -> float | None:
     if purpose is Purpose.CONFIRMATION:
         return float(found.interval[0])
     return None if found.region is None else found.region.success_low
+
+
+def _kinds(book: Book, rows: list[TrialRow]) -> dict[str, int]:
+    tokens = [row.result.token for row in rows if row.result is not None]
+    return dict(Counter(kind for token in tokens if (kind := book.attempts[token].kind or "")))
 
 
 def _confirmation(claimed: float, rows: list[TrialRow]) -> Confirmation:

@@ -48,14 +48,17 @@ def _promise(advice: Advice) -> Markup:
 def _confirmation(facts: Facts, tried: Confirmation) -> Markup:
     what = "It was" if tried.what == "tuple" else "Draws from its region were"
     verdict = "borne out" if tried.bears_out else "not borne out"
+    purpose = Purpose.CONFIRMATION if tried.what == "tuple" else Purpose.REGION
+    table = facts.table
+    chosen = table["purpose"] == purpose.value
+    kinds = " and ".join(f"{kind}s" for kind in np.unique(table["evaluator_kind"][chosen]) if kind)
     words = (
-        f"{what} tried {count(tried.trials, 'time')} on fresh noise: {tried.successes} succeeded"
+        f"{what} tried {count(tried.trials, 'time')} on fresh noise{kinds and f', on {kinds}'}:"
+        f" {tried.successes} succeeded"
         f" (95 % interval {between(*tried.interval)});"
         f" the claim of at least {share(tried.claimed)} is {verdict}."
     )
-    purpose = Purpose.CONFIRMATION if tried.what == "tuple" else Purpose.REGION
-    table = facts.table
-    bad = table["trial"][(table["purpose"] == purpose.value) & ~table["success"]].tolist()
+    bad = table["trial"][chosen & ~table["success"]].tolist()
     if bad:
         words += f" Failed: {', '.join(f'trial {trial}' for trial in bad[:5])}"
         words += f" and {len(bad) - 5} more." if len(bad) > 5 else "."
