@@ -25,7 +25,7 @@ from shearline.evaluator.robot.spool import Spool
 from shearline.evaluator.robot.states import STUCK, Cause, State
 from shearline.evaluator.robot.store import worn
 from shearline.evaluator.robot.terminal import STOP, Closed, Line, consent
-from shearline.evaluator.robot.trial import Report, Work
+from shearline.evaluator.robot.trial import Report, Work, warm
 from shearline.protocol.messages import OutcomeKind
 
 #: Share of the lab's speeds in the rehearsal after arming.
@@ -76,7 +76,11 @@ class Arm(Mover):
                 return over
 
     def begin(self) -> None:
-        """Stand there, connected, and ask the operator."""
+        """Stand there, connected, and ask the operator.
+
+        The skill is loaded first: whoever is armed must be able to hear ``stop`` at any moment.
+        """
+        warm(self._work(self._bounds.canary_tuple(), 1.0))
         self._enter(Cause.OPENED, "connected; nothing moves before you confirm")
         self._prompt()
 
@@ -165,7 +169,7 @@ class Arm(Mover):
         if why := worn(self._store.wear(), self._bounds.wear):
             self._enter(Cause.WEAR, why)
             return
-        self.alive(PATIENCE_S)  # tares, and may compile the skill
+        self.alive(PATIENCE_S)  # tares
         self._watch.refresh()
         self._must_stand()
         try:

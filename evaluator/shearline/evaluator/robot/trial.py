@@ -136,6 +136,18 @@ def to_start(port: RobotPort, watch: Watch, work: Work) -> None:
         port.set_guard(work.bounds.port_guard())
 
 
+def warm(work: Work) -> None:
+    """Have the skill's compiled layers loaded; that takes seconds, in which no thread may run."""
+    c, tip = empty_command(), np.zeros(3)
+    for phase in (semantic.APPROACH, semantic.CONTACT, semantic.INSERTION, semantic.EXTRACTION):
+        command(c, phase, 0, tip, 0.0, work.p, work.tick_s)
+    felt = np.zeros_like(work.limits.torque)
+    sight = semantic.Sight(0.0, 0.0, 0.0, 0.0, APPROACH_S)
+    end = semantic.decide(semantic.beginning(), sight, felt, work.p, work.limits, work.tick_s)
+    semantic.may_start(0.0, 0.0, felt, work.limits)
+    semantic.cost(end, work.limits, work.tick_s)
+
+
 class Insertion:
     """Runs the skill from the start pose to its verdict.
 
