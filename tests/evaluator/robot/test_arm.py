@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Callable
 from typing import Any
@@ -9,9 +10,20 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from evaluator.robot.rig import Rig, Spy, answering, attempt, bounds, stage, theta
+from evaluator.robot.rig import (
+    O_T_LOCK,
+    Rig,
+    Spy,
+    answering,
+    attempt,
+    bounds,
+    lying,
+    stage,
+    theta,
+)
 
 from shearline.evaluator.robot import pipe
+from shearline.evaluator.robot.errors import Ending, MotionEnded
 from shearline.evaluator.robot.peer import Gone
 from shearline.evaluator.robot.spool import Spool
 from shearline.evaluator.robot.states import State
@@ -71,6 +83,53 @@ def test_the_same_attempt_twice_is_one_motion_and_the_same_answer(rig: Make) -> 
     spy.moves.clear()
     assert arm.run(attempt()) == first
     assert spy.moves == []
+
+
+def test_a_contact_that_the_guard_ended_for_its_box_is_no_failure_of_the_tuple(rig: Make) -> None:
+    assert strayed(rig, {"o_t_ee": outside()}) == (OutcomeKind.ABORTED, "the tip left its box")
+    assert strayed(rig, {}) == (OutcomeKind.FAILURE, "torque"), "while for force it is one"
+
+
+def outside() -> np.ndarray:
+    at = O_T_LOCK.copy()
+    at[0, 3], at[2, 3] = 0.5, 0.15  # beside the box, and not in the lock
+    return at
+
+
+def strayed(rig: Make, lies: dict[str, Any]) -> tuple[OutcomeKind, str]:
+    """Have the guard end a contact while the robot says so of itself; return the verdict."""
+    port = lying()
+    arm = rig(port).armed()
+    aim, refs = port.ref, itertools.count()
+
+    def ref(pose: np.ndarray) -> None:
+        if next(refs) == 20:
+            port.end()
+            port.lies.update(lies)
+            port.ended = MotionEnded(Ending.GUARD, "the tip left its box")
+        aim(pose)
+
+    port.ref = ref
+    ran = arm.run(attempt()).result
+    return ran.kind, ran.why
+
+
+def test_a_trial_from_which_this_computer_was_away_is_no_measurement(rig: Make) -> None:
+    port = lying()
+    arm = rig(port).armed()
+    aim, refs = port.ref, itertools.count()
+
+    def ref(pose: np.ndarray) -> None:
+        aim(pose)
+        if next(refs) == 20:
+            for _ in range(300):
+                port.sample()
+
+    port.ref = ref
+    result = arm.run(attempt()).result
+    assert result.kind is OutcomeKind.ABORTED
+    assert "this computer was away for 0.3" in result.why
+    assert not arm.store.key_in_lock
 
 
 # -- the key -------------------------------------------------------------------------------------

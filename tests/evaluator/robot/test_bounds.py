@@ -27,7 +27,14 @@ MISTAKES = {
     LAB.replace("force_n = 60.0", "force_n = 60.0\nspeed_mps = 0.3"): "ceiling of 0.25",
     LAB.replace("force_n = 60.0", "force_n = 60.0\nroi_m = 0.01"): "roi_m",
     LAB.replace("[0.2, -0.1, 0.05]", "[0.5, -0.1, 0.05]"): "is not below",
+    LAB.replace("[start]", "[start]\nspeed_mps = 0.26"): "start.speed_mps = 0.26",
+    LAB.replace("force_n = 60.0", "force_n = 60.0\ntorque_nm = 25.0"): "ceiling of 24",
+    LAB + "[contact]\nreference_mps = 0.3": "contact.reference_mps = 0.3",
     LAB + "[contact]\nforce_max_n = 41.0": "ceiling of 40",
+    LAB + "[contact]\ntorque_max_nm = 13.0": "ceiling of 12",
+    LAB
+    + "[contact]\nstiffness_max_npm = 1400.0\n[ranges]\ncon_k_xy = [100.0, 1000.0]\n"
+    + "ins_k_xy = [50.0, 1000.0]": "below the 1500",
     LAB + "[contact]\nclip_m = 0.03": "is more than the 40",
     LAB + "[contact]\nclip_rad = 0.3": "is more than the 12",
     LAB + "[contact]\nstiffness_max_npm = 1600.0": "narrow ranges",

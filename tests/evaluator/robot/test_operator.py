@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from evaluator.robot.rig import Rig, Spy, answering, attempt, bounds, lying
+from evaluator.robot.rig import Rig, Spy, answering, attempt, bounds, lying, stage
 
 from shearline.evaluator.robot.port import Mode
 from shearline.evaluator.robot.states import State
@@ -193,6 +193,29 @@ def test_a_recovery_typed_before_the_stop_recovers_nothing(rig: Make) -> None:
     held = arm.state
     arm.type("recover")
     assert (held, arm.state) == (State.HOLD, State.IDLE)
+
+
+# -- what must hold before anything moves --------------------------------------------------------
+
+
+def test_a_robot_that_does_not_stand_idle_is_not_armed(rig: Make) -> None:
+    spy, port = Spy(), lying()
+    arm = rig(port)
+    port.lies["mode"] = Mode.OTHER
+    arm.type("confirm")
+    assert arm.state is State.FAULT
+    assert "not idle" in arm.printed
+    assert spy.moves == []
+
+
+def test_a_tip_that_is_where_only_a_key_in_the_lock_can_be_begins_no_trial(rig: Make) -> None:
+    spy = Spy()
+    spy.stage = stage("hand")
+    arm = rig(spy)
+    arm.type("confirm")
+    assert arm.state is State.FAULT
+    assert "as if in the lock: free the key first" in arm.printed
+    assert spy.moves == []
 
 
 # -- touches and tares ---------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from evaluator.robot.clockwork import Clockwork, limits, port
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shearline.evaluator.robot.client import COLUMNS, Client, Drive, beyond
+from shearline.evaluator.robot.client import COLUMNS, SPEED_STATES, Client, Drive, beyond
 from shearline.evaluator.robot.errors import Ending, MotionEnded, RobotRefused
 from shearline.evaluator.robot.frames import rpy
 from shearline.evaluator.robot.franky import FrankyClient
@@ -28,7 +28,7 @@ from shearline.evaluator.robot.free import (
 )
 from shearline.evaluator.robot.panda import PandaClient
 from shearline.evaluator.robot.path import off, turned
-from shearline.evaluator.robot.port import Array
+from shearline.evaluator.robot.port import Array, log_columns
 
 
 def goal(x_m: float) -> Array:
@@ -119,6 +119,56 @@ def test_a_free_motion_from_or_to_nowhere_does_not_begin(whose: str) -> None:
     assert client.drives == []
 
 
+def row_with(**felt: float) -> Array:
+    """Return a state at rest in the middle of its box that feels, or is, something else."""
+    row, names = np.zeros(COLUMNS), log_columns(7)
+    for name, value in ({"o_t_ee.00": 1.0, "o_t_ee.11": 1.0, "o_t_ee.22": 1.0} | felt).items():
+        row[names.index(name)] = value
+    return row
+
+
+@pytest.mark.parametrize(
+    ("felt", "why"),
+    [
+        ({"tau_ext.3": 0.93 * 40.0}, "joint 3 felt"),
+        ({"o_f_ext.fx": 60.1}, "the tip felt 60.1 N"),
+        ({"o_f_ext.mz": -15.1}, "the tip felt 15.10 N m"),
+        ({"o_t_ee.03": 1.1}, "the tip left its box"),
+        ({"o_t_ee.23": -1.1}, "the tip left its box"),
+    ],
+)
+def test_a_state_beyond_any_limit_of_the_guard_ends_the_contact(
+    felt: dict[str, float], why: str
+) -> None:
+    drive = Drive(contact(5.0), limits(), np.zeros(13))
+    assert beyond([row_with()], drive) is None
+    ended = beyond([row_with(**felt)], drive)
+    assert ended is not None
+    assert ended.ending is Ending.GUARD
+    assert why in str(ended)
+
+
+@pytest.mark.parametrize(("speed_mps", "ends"), [(0.24, False), (0.26, True)])
+def test_a_tip_that_is_too_fast_ends_the_contact(speed_mps: float, *, ends: bool) -> None:
+    drive = Drive(contact(5.0), limits(), np.zeros(13))
+    ticks = np.arange(SPEED_STATES + 1) * 1e-3
+    rows = [row_with(**{"t_s": t_s, "o_t_ee.03": speed_mps * t_s}) for t_s in ticks]
+    assert (beyond(rows, drive) is not None) is ends
+
+
+def test_a_session_that_is_not_the_last_moves_nothing() -> None:
+    client = Clockwork()
+    made = port(client)
+    first = made.contact(contact(5.0))
+    made.contact(contact(5.0))
+    for call in (lambda: first.ref(goal(0.01)), lambda: first.gains(STIFFNESS, DAMPING)):
+        with pytest.raises(MotionEnded, match="another contact has begun"):
+            call()
+    first.end()
+    assert client.running(), "nor does it end the last one"
+    assert client.aims == []
+
+
 # -- tares ----------------------------------------------------------------------------------------
 
 
@@ -135,6 +185,14 @@ def test_a_tare_above_a_quarter_of_the_guard_is_refused_and_changes_nothing(of: 
     felt = np.concatenate([after.tau_ext - before.tau_ext, after.o_f_ext - before.o_f_ext])
     assert felt[of] == pytest.approx(-15.5)
     made.move_free(goal(0.0), 0.1)  # the guard before still holds
+
+
+def test_no_guard_is_set_while_the_arm_moves() -> None:
+    client = Clockwork()
+    made = port(client)
+    made.contact(contact(5.0))
+    with pytest.raises(RobotRefused, match="expected it at rest"):
+        made.set_guard(limits())
 
 
 def test_a_guard_may_be_set_without_a_tare() -> None:
