@@ -48,6 +48,7 @@ from shearline.evaluator.robot.port import (
 )
 from shearline.evaluator.robot.reader import Reader
 from shearline.evaluator.robot.session import Session
+from shearline.evaluator.robot.watch import STALL_S
 
 #: Between two references of a free motion [s]; one never advances by more than twice that.
 REFERENCE_S = 5e-3
@@ -380,7 +381,8 @@ class Franka:
         self._expect_open()
         if self._latch is not None:
             raise MotionEnded(self._latch.ending, str(self._latch))
-        if self._reader.busy:
+        deadline = time.monotonic() + STALL_S
+        while self._reader.busy and time.monotonic() < deadline:
             self.sample()
         if self._reader.busy:
             raise self._latched(Ending.INVALID, "the robot sends no new states: its clock stands")
