@@ -32,8 +32,9 @@ from shearline.protocol.task import TaskSpec
 #: How often the trial's thread beats while the arm works [s].
 BEAT_S = 0.05
 
-#: An arm's process that starts may need so long for imports and the robot's connection [s].
-START_S = 60.0
+#: An arm's process that starts may need so long for imports, the robot's connection and, the first
+#: time on a computer, the compiler [s].
+START_S = 180.0
 
 #: A stopped arm that is alive may take so long up the ladder and back to the start pose [s].
 FAREWELL_S = 60.0
