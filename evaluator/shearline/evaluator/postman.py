@@ -53,6 +53,10 @@ _parse = functools.lru_cache(maxsize=64)(parse)
 #: due after a quarter of one.
 LOOK_LEASES = 0.05
 
+#: Longest sleep of a thread that no run employs: a signal that comes between Python's look for
+#: signals and its sleep does not end it [s].
+WAKE_S = 0.5
+
 #: Malformed messages that are told to people; the others are only counted.
 COMPLAINTS_MAX = 10
 
@@ -158,7 +162,8 @@ class Exchange:
                     return self.jobs.popleft()
                 self.is_busy = postman is None
             if postman is None:
-                self.calls.get()
+                with contextlib.suppress(Empty):
+                    self.calls.get(timeout=WAKE_S)
             else:
                 self._await(postman)
 
