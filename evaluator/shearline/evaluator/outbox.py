@@ -37,12 +37,13 @@ class Outbox:
 
     def put(self, result: Result, now_s: float) -> None:
         """Have a result sent, from now on until it is acknowledged."""
+        self.answered.pop(result.token, None)
         self.unacked[result.token] = _Unacked(result, now_s)
 
     def again(self, token: str, now_s: float) -> bool:
         """Have the result of a trial that came again sent at once; tell whether there is one."""
         if token in self.answered:
-            self.put(self.answered.pop(token), now_s)
+            self.put(self.answered[token], now_s)
         elif token in self.unacked:
             self.unacked[token].due_s = now_s
         else:
