@@ -45,6 +45,7 @@ LEASE_S = 2.0
 BEAT_S = LEASE_S / 2
 RENEW_S = LEASE_S / 4
 RESEND_S = LEASE_S / 4
+SILENCE_S = 10 * LEASE_S
 
 #: A stubborn evaluator's longest trial; whoever supervises evaluators kills it by then.
 FOREVER_S = 60.0
@@ -98,6 +99,7 @@ class SimEvaluator:
         self.alive, self.frozen, self.hung = True, False, False
         self.welcomed = self.held = self.leaving = False
         self.epoch = self.seq = 0
+        self.heard_s = self.clock.now_s
         self.queue: deque[Trial] = deque()
         self.running: Trial | None = None
         self.results: dict[str, Result] = {}
@@ -151,7 +153,7 @@ class SimEvaluator:
             self._say(
                 CreditReceived(self.name, Credit(boot=boot, seq=self.seq, credits=self.credits))
             )
-        else:
+        if not self.welcomed or self.clock.now_s - self.heard_s > SILENCE_S:
             self._say(HelloReceived(self.name, self.hello(boot)))
         self.clock.after(BEAT_S if self.welcomed else RESEND_S, lambda: self._beat(boot))
 
@@ -220,6 +222,7 @@ class SimEvaluator:
             return
         if getattr(message, "boot", boot) != boot:
             return
+        self.heard_s = self.clock.now_s
         match message:
             case Welcome():
                 self.welcomed, self.held = True, message.held

@@ -48,6 +48,12 @@ def test_every_promise_holds_under_many_more(first: int) -> None:
     assert_holds(first, first + PUSH_GROUP)
 
 
+def test_who_was_replaced_while_it_thought_itself_welcome_greets_again() -> None:
+    # A forged hello took a robot's name; the robot's own, late, made it a challenger that nobody
+    # answered and that had no reason to say hello once more, and confirmations waited for it.
+    assert_holds(257_703, 257_704)
+
+
 @pytest.mark.parametrize("name", PLANTS)
 def test_a_planted_bug_is_found(name: str) -> None:
     plant = PLANTS[name]
