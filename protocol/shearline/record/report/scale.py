@@ -32,7 +32,8 @@ class Scale:
         """Return where values lie, 0 at the beginning and 1 at the end, and not beyond."""
         v = np.asarray(values, dtype=np.float64)
         if self.log:
-            shares = np.log(np.maximum(v, self.low) / self.low) / math.log(self.high / self.low)
+            low = math.log(self.low)  # a quotient of two values may be beyond all numbers
+            shares = (np.log(np.maximum(v, self.low)) - low) / (math.log(self.high) - low)
         else:
             shares = (v - self.low) / (self.high - self.low)
         return np.clip(shares, 0.0, 1.0)
