@@ -13,6 +13,9 @@ Array = npt.NDArray[np.float64]
 #: An axis of positive values is logarithmic when the highest is this often the lowest tenth.
 DECADES_RATIO = 20.0
 
+#: Below this, and above its inverse, there is no room left beside a value on a logarithmic axis.
+LOG_MIN = 1e-250
+
 
 @dataclass(frozen=True, slots=True)
 class Scale:
@@ -53,8 +56,9 @@ def holding(values: npt.ArrayLike, *, zero: bool = False, log: bool = False) -> 
     if not v.size:
         return Scale(0.0, 1.0)
     low, high = float(v.min()), float(v.max())
-    if log and low > 0.0 and high > DECADES_RATIO * np.quantile(v, 0.1):
-        room = (high / low) ** 0.04
+    can_log = log and LOG_MIN < low and high < 1.0 / LOG_MIN
+    if can_log and high > DECADES_RATIO * np.quantile(v, 0.1):
+        room = math.exp(0.04 * (math.log(high) - math.log(low)))
         return Scale(low / room, high * room, log=True)
     if zero and low >= 0.0:
         return Scale(0.0, high * 1.05 if high > 0.0 else 1.0)
