@@ -56,7 +56,7 @@ def holding(values: npt.ArrayLike, *, zero: bool = False, log: bool = False) -> 
     if not v.size:
         return Scale(0.0, 1.0)
     low, high = float(v.min()), float(v.max())
-    can_log = log and LOG_MIN < low and high < 1.0 / LOG_MIN
+    can_log = log and low > LOG_MIN and high < 1.0 / LOG_MIN
     if can_log and high > DECADES_RATIO * np.quantile(v, 0.1):
         room = math.exp(0.04 * (math.log(high) - math.log(low)))
         return Scale(low / room, high * room, log=True)
