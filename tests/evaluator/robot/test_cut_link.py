@@ -16,7 +16,7 @@ from shearline.learner.dispatcher.entries import ResultTaken
 
 pytestmark = [pytest.mark.slow, pytest.mark.chaos]
 
-TRIALS = 24
+TRIALS = 60
 RUN = [
     "--task", "keylock", "--learner", "random", "--episodes", "1", "--trials", str(TRIALS),
     "--lease", "1", "--no-record",
