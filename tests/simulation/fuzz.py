@@ -178,6 +178,12 @@ def may_act(event: Event, desk: Desk) -> bool:
         case ResultReceived(name, Result(token=token)):
             attempt = desk.book.attempts.get(token)
             return attempt is not None and attempt.evaluator == name
+        case RenewReceived(name, Renew(boot=boot, tokens=tokens)) if any(
+            (attempt := desk.book.attempts.get(token)) is not None
+            and (attempt.evaluator, attempt.boot) == (name, boot)
+            for token in tokens
+        ):
+            return True  # a boot that was replaced may still run what it was given
         case RenewReceived(name, message) | CreditReceived(name, message):
             known = desk.roster.get(name)
             return known is not None and known.boot == message.boot
