@@ -121,7 +121,7 @@ class HiREPS(EpisodicLearner):
         if episode == 0:
             self._policies = [first_policy(len(self.space), rng, self.config)]
             if len(trials):
-                with fitting():
+                with fitting(*LIBRARIES):
                     self._policies = [renew(self._policies, trials, self.config)]
         else:
             self._policies.append(self._renewed(trials))

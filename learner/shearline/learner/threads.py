@@ -31,11 +31,13 @@ def load(*libraries: str) -> Any:
     return ThreadpoolController()
 
 
-def fitting(*libraries: str) -> AbstractContextManager[object]:
+def fitting(library: str, *others: str) -> AbstractContextManager[object]:
     """Return a context in which BLAS and OpenMP libraries use one thread.
 
     Args:
-        libraries: Modules that the fit needs, loaded here; numpy is always one of them.
+        library: A module that the fit needs. It is loaded here: what is loaded within the context
+            would use as many threads as it likes.
+        others: More of them; numpy is always one.
     """
-    context: AbstractContextManager[object] = load(*libraries).limit(limits=1)
+    context: AbstractContextManager[object] = load(library, *others).limit(limits=1)
     return context
