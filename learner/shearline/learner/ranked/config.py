@@ -37,7 +37,7 @@ class RankedConfig:
     pessimism: float = 0.5
     spread: float = 1.0
     widening: float = 0.3
-    floor: float = 0.15
+    floor: float = 0.1
     moves: int = 2
     draws: int = 30
     reliability: bool = True

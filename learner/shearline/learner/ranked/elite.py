@@ -66,22 +66,18 @@ class Elite:
         }
 
 
-def elite_size(episode_length: int, n: int, successes: int, noise: float) -> int:
+def elite_size(episode_length: int, n: int, successes: int) -> int:
     """Return how many successes make the elite.
 
-    Half of an episode, but enough to say something about ``n`` spreads, where costs can be
-    trusted. The more of them is noise, the more the choice among successes is luck: towards
-    half of all successes, so that the elite does not narrow on nothing.
+    Half of an episode, but enough to say something about ``n`` spreads. They are chosen by what the
+    model expects of them, not by their luck, so that more of them would only be older ones.
 
     Args:
         episode_length: Trials of an episode.
         n: Number of parameters.
         successes: How many there are.
-        noise: Share of the costs' variance that no model explains, 0 to 1.
     """
-    least = max(episode_length // 2, n // 2 + 5)
-    most = max(least, successes // 2)
-    return min(least + round(noise * (most - least)), successes)
+    return min(max(episode_length // 2, n // 2 + 5), successes)
 
 
 def rank_weights(count: int) -> Array:
@@ -124,5 +120,5 @@ def cheapest(trials: Trials, episode_length: int, spread: float) -> Elite:
         spread: Factor on the deviations.
     """
     won = trials.where(trials.success)
-    count = elite_size(episode_length, won.u.shape[1], len(won), noise=0.0)
+    count = elite_size(episode_length, won.u.shape[1], len(won))
     return fit_elite(won.u[np.argsort(won.cost, kind="stable")[:count]], spread)

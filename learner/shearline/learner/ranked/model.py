@@ -123,7 +123,7 @@ def _fit(seen: Trials, won: Trials, episode_length: int, config: RankedConfig) -
     chance = reliability.probability(won.u, config.pessimism)
     expected = cost.mean(won.u) if config.cost else won.cost
     worth = score(expected, chance if config.reliability else np.ones(len(won)), price)
-    size = elite_size(episode_length, won.u.shape[1], len(won), cost.noise)
+    size = elite_size(episode_length, won.u.shape[1], len(won))
     order = np.argsort(worth, kind="stable")[:size]
     elite = fit_elite(won.u[order], widened(config, reliability.probability(won.u[order])))
     model = Model(
