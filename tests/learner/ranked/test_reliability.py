@@ -76,17 +76,6 @@ def test_what_was_seen_while_a_run_was_wide_still_counts_when_it_is_narrow(seed:
     assert np.corrcoef(p, log_odds(fresh))[0, 1] > 0.4
 
 
-@pytest.mark.parametrize("n", [2, 6, 20, 60])
-def test_luck_looks_no_more_like_a_pattern_the_more_parameters_there_are(n: int) -> None:
-    def found(seed: int) -> float:
-        rng = np.random.default_rng(seed)
-        luck = Trials(np.arange(60), rng.random((60, n)), np.ones(60), rng.random(60) < 0.7)
-        p = fitted(luck).probability(rng.random((200, n)))
-        return float(np.std(np.log(p / (1.0 - p))))
-
-    assert np.mean([found(seed) for seed in range(10)]) < 1.0
-
-
 @given(SEEDS)
 def test_a_snapshot_is_the_same_function_written_around_the_middle(seed: int) -> None:
     model, u = fitted(tried(seed, 50)), np.random.default_rng(seed).random((20, 4))

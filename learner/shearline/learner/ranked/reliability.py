@@ -24,10 +24,8 @@ from shearline.learner.ledger import Trials
 NEWTON_STEPS = 12
 #: Precision of the prior on the intercept and on the distance: log-odds of some units either way.
 WIDE = 0.05
-#: How far all parameters together move the log-odds over the cube, before anything is seen: one
-#: deviation. With a few dozen failures a looser prior lets each of twenty parameters promise more
-#: reliability than there is, and where a run hardly fails any more nothing else is followed.
-TOGETHER = 1.0
+#: Precision of the weights of one parameter: log-odds of about one unit for half an edge.
+EACH = 1.0
 #: Least length that counts as one deviation of the successes, in edges of the cube: a run that has
 #: narrowed to nothing does not take all that it saw before for far away.
 SCALE_MIN = 0.05
@@ -126,8 +124,7 @@ def fit_reliability(seen: Trials, won: Trials) -> Reliability:
     """
     centre, scale = won.u.mean(axis=0), np.maximum(won.u.std(axis=0), SCALE_MIN)
     phi, success = features(seen.u, centre, scale), seen.success
-    # A line in x over [-1, 1] has the variance 1/3: n of them with this precision have TOGETHER^2.
-    precision = np.full(phi.shape[1], len(centre) / (3.0 * TOGETHER**2))
+    precision = np.full(phi.shape[1], EACH)
     precision[:2] = WIDE
     mean, covariance = _laplace(phi, success, precision)
     return Reliability(centre, scale, mean, covariance)
