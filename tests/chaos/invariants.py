@@ -27,13 +27,19 @@ from shearline.learner.dispatcher.entries import (
     TrialLost,
     TrialsProposed,
 )
-from shearline.protocol.messages import Ack, CommandKind, OutcomeKind, Result, Trial, Verdict
+from shearline.protocol.messages import (
+    DECIDING,
+    JUDGED,
+    Ack,
+    CommandKind,
+    OutcomeKind,
+    Result,
+    Trial,
+    Verdict,
+)
 
 #: Live attempts one trial may have at once.
 LIVE_MAX = 2
-
-_DECIDING = {Verdict.COUNTED, Verdict.LATE}
-_VERDICTS_OF_RUNS = {OutcomeKind.SUCCESS, OutcomeKind.FAILURE}
 
 
 class BrokenError(AssertionError):
@@ -189,9 +195,9 @@ class Audit:
         assert attempt.issued.trial == result.trial, "a result names another trial"
         assert attempt.state != "answered", "a second result of one attempt was taken"
         self._end(result.token, "answered")
-        decides = result.kind in _VERDICTS_OF_RUNS
+        decides = result.kind in JUDGED
         assert decides == (entry.verdict is not Verdict.NOTED), "an abort became an outcome"
-        if entry.verdict in _DECIDING:
+        if entry.verdict in DECIDING:
             assert trial.outcome is None, "a trial was counted twice"
             is_open = self._open is not None and attempt.issued.trial in self._open
             on_time = is_open and not trial.is_lost

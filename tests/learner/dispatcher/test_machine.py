@@ -46,6 +46,8 @@ from shearline.learner.dispatcher.instructions import (
     Told,
 )
 from shearline.protocol.messages import (
+    DECIDING,
+    JUDGED,
     Ack,
     Bye,
     CommandKind,
@@ -96,7 +98,7 @@ class Model:
             return Verdict.UNKNOWN
         if attempt.answered:
             return Verdict.DUPLICATE
-        if result.kind in {OutcomeKind.ABORTED, OutcomeKind.REJECTED}:
+        if result.kind not in JUDGED:
             return Verdict.NOTED
         if attempt.trial in self.outcomes:
             return Verdict.DUPLICATE
@@ -108,7 +110,7 @@ class Model:
             return
         attempt = self.attempts[result.token]
         attempt.answered = True
-        if verdict in {Verdict.COUNTED, Verdict.LATE}:
+        if verdict in DECIDING:
             self.outcomes[attempt.trial] = result.cost
 
     def see(self, instruction: Instruction) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import rerun as rr
 
 from shearline.evaluator.replay import Replayed
-from shearline.protocol.messages import Counted, OutcomeKind
+from shearline.protocol.messages import JUDGED, Counted
 from shearline.record.layout import Shape, pages
 from shearline.record.page import ROOTS, draw_page
 from shearline.record.reader import Run, Trace, to_trace
@@ -66,7 +66,7 @@ def shape(run: Run, replayed: Replayed) -> Shape:
 def as_outcome(replayed: Replayed) -> Counted:
     """Return how a replayed trial ended as the message that would be on record."""
     case, verdict = replayed.case, replayed.verdict
-    judged = verdict.kind in {OutcomeKind.SUCCESS, OutcomeKind.FAILURE}
+    judged = verdict.kind in JUDGED
     return Counted(
         trial=case.trial,
         episode=case.outcome.episode if case.outcome else 0,

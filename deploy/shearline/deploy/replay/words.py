@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from shearline.evaluator.replay import Change, Replayed, Verification
-from shearline.protocol.messages import OutcomeKind
+from shearline.protocol.messages import JUDGED
 
 #: Width of the names and of each column of values.
 NAME, VALUE = 14, 22
@@ -142,7 +142,7 @@ def _recorded(replayed: Replayed) -> dict[str, Any] | None:
 
 def _replayed(replayed: Replayed) -> dict[str, Any]:
     verdict = replayed.verdict
-    judged = verdict.kind in {OutcomeKind.SUCCESS, OutcomeKind.FAILURE}
+    judged = verdict.kind in JUDGED
     return {
         "outcome": verdict.kind.value,
         "cost": verdict.cost if judged else None,

@@ -15,7 +15,7 @@ from shearline.evaluator.local import Verdict, run_trial, trace_data
 from shearline.evaluator.replay.case import Case, outcome_digest
 from shearline.evaluator.replay.change import Change
 from shearline.protocol.errors import ConfigError
-from shearline.protocol.messages import OutcomeKind, TraceData, clip
+from shearline.protocol.messages import JUDGED, TraceData, clip
 from shearline.protocol.space import Space
 
 #: Stands where an attempt's token would; nobody handed this one out.
@@ -44,7 +44,7 @@ class Replayed:
     def digest(self) -> str:
         """Digest of the full trace, or of the outcome where the record has none of a trace."""
         v = self.verdict
-        if v.kind in {OutcomeKind.ABORTED, OutcomeKind.REJECTED}:
+        if v.kind not in JUDGED:
             return ""
         if v.digest and not self.case.without_trace:
             return v.digest

@@ -16,7 +16,7 @@ from PIL import ImageDraw, ImageFont
 from shearline.evaluator.base import Trace
 from shearline.evaluator.replay.again import Replayed
 from shearline.evaluator.replay.video import Image
-from shearline.protocol.messages import OutcomeKind
+from shearline.protocol.messages import JUDGED
 
 #: Of the strip below and of the caption above [pixels].
 HEIGHT = 160
@@ -53,7 +53,7 @@ def caption(replayed: Replayed, speed: float, width: int) -> Image:
 def said(replayed: Replayed, speed: float) -> tuple[str, str]:
     """Return the caption in words: the trial and how it ended, and what to know about it."""
     verdict, space = replayed.verdict, replayed.case.task.space
-    judged = verdict.kind in {OutcomeKind.SUCCESS, OutcomeKind.FAILURE}
+    judged = verdict.kind in JUDGED
     cost = f", cost {verdict.cost:.3g}" if judged else ""
     why = f" ({verdict.why})" if verdict.why else ""
     triples = zip(space.items(), replayed.theta, replayed.case.theta, strict=True)

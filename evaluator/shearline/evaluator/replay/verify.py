@@ -14,7 +14,7 @@ from shearline.evaluator.replay.again import Replayed, again
 from shearline.evaluator.replay.case import Case
 from shearline.evaluator.replay.compare import compare
 from shearline.protocol.errors import ConfigError
-from shearline.protocol.messages import Counted, OutcomeKind
+from shearline.protocol.messages import JUDGED, Counted
 from shearline.protocol.task import TaskSpec, digest
 
 
@@ -86,7 +86,7 @@ def judge(replayed: Replayed, spec: TaskSpec) -> Verification:
 def _difference(replayed: Replayed, recorded: Counted) -> str:
     """Return what came out differently, or ``""``."""
     verdict = replayed.verdict
-    if verdict.kind in {OutcomeKind.ABORTED, OutcomeKind.REJECTED}:
+    if verdict.kind not in JUDGED:
         return f"it was {recorded.kind} and is {verdict.kind} here ({verdict.why})"
     traces = _traces(replayed)
     if recorded.digest and replayed.digest != recorded.digest:

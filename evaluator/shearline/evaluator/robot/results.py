@@ -16,7 +16,7 @@ from shearline.evaluator.robot.trial import Report
 from shearline.evaluator.skill import semantic
 from shearline.evaluator.skill.parameters import Parameters, parameters
 from shearline.evaluator.skill.semantic import Limits
-from shearline.protocol.messages import OutcomeKind, Result, TraceData, Trial, clip
+from shearline.protocol.messages import JUDGED, OutcomeKind, Result, TraceData, Trial, clip
 
 #: Joints of the arm that the task's own torque limits are for.
 _TASK_JOINTS = 7
@@ -88,7 +88,7 @@ class Ran:
     @property
     def is_judged(self) -> bool:
         """Whether there is a verdict, and thus a cost."""
-        return self.kind in {OutcomeKind.SUCCESS, OutcomeKind.FAILURE}
+        return self.kind in JUDGED
 
 
 def result_of(trial: Trial, ran: Ran, cell: Cell) -> tuple[Result, TraceData | None]:

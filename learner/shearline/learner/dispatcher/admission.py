@@ -13,7 +13,7 @@ from shearline.learner.dispatcher.entries import AttemptReturned, LapseReason
 from shearline.learner.dispatcher.events import ByeReceived, EvaluatorGone, HelloReceived
 from shearline.learner.dispatcher.roster import Challenger, Evaluator
 from shearline.learner.dispatcher.rules import EVALUATORS_MAX
-from shearline.learner.dispatcher.states import RunState
+from shearline.learner.dispatcher.states import ENDING, RunState
 from shearline.protocol.messages import (
     VERSION,
     Command,
@@ -33,7 +33,7 @@ def hello(desk: Desk, event: HelloReceived) -> None:
         if not known.left:
             _again(desk, known, message)
         return
-    if desk.state in {RunState.STOPPING, RunState.ENDED}:
+    if desk.state in ENDING:
         desk.send(name, Refused(boot=message.boot, why="the run is ending", ended=True))
         return
     why = _objection(desk, message)

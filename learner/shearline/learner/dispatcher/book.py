@@ -42,6 +42,7 @@ from shearline.learner.dispatcher.states import (
     advance,
 )
 from shearline.protocol.messages import (
+    DECIDING,
     CommandKind,
     EpisodeClosed,
     OutcomeKind,
@@ -223,7 +224,7 @@ class Book:
         attempt = self.attempts[entry.result.token]
         trial = self.trials[attempt.trial]
         attempt.state = advance(ATTEMPT, attempt.state, _attempt_cause(entry))
-        if entry.verdict in {Verdict.COUNTED, Verdict.LATE}:
+        if entry.verdict in DECIDING:
             self._count(trial, entry.result)
         elif entry.verdict is Verdict.DUPLICATE:
             self.tally.surplus += 1
@@ -306,7 +307,7 @@ class Book:
 
 
 def _attempt_cause(entry: ResultTaken) -> AttemptCause:
-    if entry.verdict in {Verdict.COUNTED, Verdict.LATE}:
+    if entry.verdict in DECIDING:
         return AttemptCause.DECIDES
     if entry.verdict is Verdict.DUPLICATE:
         return AttemptCause.SURPLUS

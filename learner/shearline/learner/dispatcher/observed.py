@@ -17,7 +17,7 @@ from shearline.learner.dispatcher.entries import (
     TrialsProposed,
 )
 from shearline.learner.dispatcher.states import TrialState
-from shearline.protocol.messages import Counted, Message, Proposed, Verdict
+from shearline.protocol.messages import DECIDING, Counted, Message, Proposed, Verdict
 
 
 def history(entries: Iterable[Entry]) -> Iterator[Message]:
@@ -59,7 +59,7 @@ def messages(book: Book, entry: Entry) -> list[Message]:
 
 
 def _of_result(book: Book, entry: ResultTaken) -> list[Message]:
-    if entry.verdict not in {Verdict.COUNTED, Verdict.LATE}:
+    if entry.verdict not in DECIDING:
         return []
     result = entry.result
     attempt = book.attempts[result.token]

@@ -14,8 +14,8 @@ from shearline.learner.dispatcher.desk import Desk, Lease
 from shearline.learner.dispatcher.entries import AttemptRevived, ResultTaken
 from shearline.learner.dispatcher.events import RenewReceived, ResultReceived
 from shearline.learner.dispatcher.roster import Evaluator
-from shearline.learner.dispatcher.states import ANSWERED, AttemptState, RunState, TrialState
-from shearline.protocol.messages import Ack, OutcomeKind, Verdict
+from shearline.learner.dispatcher.states import ANSWERED, ENDING, AttemptState, TrialState
+from shearline.protocol.messages import DECIDING, JUDGED, Ack, OutcomeKind, Verdict
 
 _VERDICTS = {
     TrialState.PENDING: Verdict.COUNTED,
@@ -64,7 +64,7 @@ def result(desk: Desk, event: ResultReceived) -> Verdict:
     verdict = _verdict(trial, message.kind)
     _take(desk, event, verdict)
     _acknowledge(desk, event, verdict)
-    if known is not None and verdict in {Verdict.COUNTED, Verdict.LATE}:
+    if known is not None and verdict in DECIDING:
         known.done += 1
     elif verdict is Verdict.NOTED:
         desk.say(f"trial {trial.number} {message.kind} by {name}: {message.why or 'no reason'}")
@@ -89,7 +89,7 @@ def _take(desk: Desk, event: ResultReceived, verdict: Verdict) -> None:
             evaluator=event.evaluator,
             verdict=verdict,
             result=event.message,
-            excused=desk.state in {RunState.STOPPING, RunState.ENDED},
+            excused=desk.state in ENDING,
         )
     )
     lease = desk.leases.pop(event.message.token, None)
@@ -105,7 +105,7 @@ def _acknowledge(desk: Desk, event: ResultReceived, verdict: Verdict) -> Verdict
 
 def _verdict(trial: TrialRow, kind: OutcomeKind) -> Verdict:
     verdict = _VERDICTS[trial.state]
-    if kind in {OutcomeKind.ABORTED, OutcomeKind.REJECTED}:
+    if kind not in JUDGED:
         return Verdict.NOTED
     return verdict
 

@@ -21,6 +21,10 @@ class RunState(enum.StrEnum):
     ENDED = "ended"  # results are still acknowledged, nothing else happens
 
 
+#: No attempt is handed out ever again in this epoch.
+ENDING = frozenset({RunState.STOPPING, RunState.ENDED})
+
+
 class RunCause(enum.StrEnum):
     """What can happen to the run."""
 

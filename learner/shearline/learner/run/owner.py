@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 from shearline.learner.base import Recommendation
 from shearline.learner.dispatcher import Dispatcher, status
-from shearline.learner.dispatcher.entries import EpisodeDone, LearnerBooted, TrialsProposed
+from shearline.learner.dispatcher.entries import Entry, EpisodeDone, LearnerBooted, TrialsProposed
 from shearline.learner.dispatcher.events import Begin, Event, Tick
 from shearline.learner.dispatcher.instructions import (
     Ask,
@@ -196,12 +196,13 @@ class Owner:
         return self._zero_s + time.monotonic()
 
     def _event(self, item: object) -> Event | None:
+        if isinstance(item, Arrival):  # what comes with every trial first
+            self._outgoing.copy(item.key, item.payload, self._now_s(), sent=False)
+            return self._incoming.event(item)
+        if isinstance(item, Presence):
+            return self._incoming.event(item)
         if isinstance(item, Event):
             return item
-        if isinstance(item, Arrival):
-            self._outgoing.copy(item.key, item.payload, self._now_s(), sent=False)
-        if isinstance(item, Arrival | Presence):
-            return self._incoming.event(item)
         if isinstance(item, Modelled):
             self._outgoing.publish(
                 Snapshot(
@@ -218,13 +219,23 @@ class Owner:
     # -- out --------------------------------------------------------------------------------
 
     def _carry_out(self, out: list[Instruction]) -> None:
-        entries = [i.entry for i in out if isinstance(i, Journal)]
+        entries: list[Entry] = []
+        sends: list[Send] = []
+        others: list[Instruction] = []
+        for instruction in out:
+            match instruction:
+                case Journal(entry):
+                    entries.append(entry)
+                case Send():
+                    sends.append(instruction)
+                case _:
+                    others.append(instruction)
         if entries:
             self._journal.append(entries, sync=any(isinstance(e, _DEAR) for e in entries))
         # Evaluators wait for what is said to them; observers and the log do not.
-        for send in together([i for i in out if isinstance(i, Send)]):
+        for send in together(sends):
             self._outgoing.send(send.evaluator, send.message, self._now_s())
-        for instruction in out:
+        for instruction in others:
             if isinstance(instruction, Publish | Say):
                 self._news.append(instruction)
             else:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from shearline.protocol.codec import decode
 from shearline.protocol.errors import ProtocolError
-from shearline.protocol.messages import OutcomeKind, Result, Wire
+from shearline.protocol.messages import JUDGED, Result, Wire
 from shearline.record.reader import Run
 from shearline.record.report.facts import Facts
 from shearline.record.report.markup import Markup, join, tag
@@ -70,7 +70,7 @@ def aborts(run: Run) -> list[Abort]:
             result = decode(wire.payload, Result)
         except ProtocolError:
             continue  # the learner did not understand it either
-        if result.kind in (OutcomeKind.ABORTED, OutcomeKind.REJECTED):
+        if result.kind not in JUDGED:
             found.setdefault((result.kind.value, result.why), {})[result.token] = result.trial
     ordered = sorted(found.items(), key=lambda item: (-len(item[1]), item[0]))
     return [Abort(kind, why, tuple(tokens.values())) for (kind, why), tokens in ordered]
