@@ -17,6 +17,7 @@ import zenoh
 
 from shearline.deploy.processes import die_with_parent
 from shearline.deploy.transport.child import Children, report, statistics
+from shearline.deploy.transport.task import wait
 from shearline.protocol.endpoints import free_endpoint
 from shearline.protocol.link import Link, open_client, open_router
 
@@ -28,8 +29,8 @@ BACK_BYTES = 166
 WARM = 100
 
 
-def answer(endpoint: str, name: str) -> None:
-    """Send everything back until the parent's end of standard input closes."""
+def answer(endpoint: str, name: str, wall_s: float) -> None:
+    """Send everything back, each after ``wall_s``, until the process is killed."""
     session = _session(open_client(endpoint))
     back = session.declare_publisher(
         f"echo/back/{name}", congestion_control=zenoh.CongestionControl.BLOCK
@@ -39,6 +40,7 @@ def answer(endpoint: str, name: str) -> None:
     back.put(payload)  # says that we are here
     while True:
         there.recv()
+        wait(wall_s)
         back.put(payload)
 
 
@@ -102,14 +104,14 @@ class Asker:
         return statistics(times_s[warm:]) | {"rate_hz": trips / (ended_s - began_s)}
 
 
-def ask(echoes: int, trips: int) -> None:
-    """Measure and print one JSON object."""
+def ask(echoes: int, trips: int, wall_s: float) -> None:
+    """Measure echoes that take ``wall_s`` each; print one JSON object."""
     endpoint = free_endpoint()
     names = [f"e{i}" for i in range(echoes)]
     with open_router(endpoint) as link, Children() as children:
         asker = Asker(_session(link), names)
         for name in names:
-            children.start("echo", endpoint, name)
+            children.start("echo", endpoint, name, wall_s)
         asker.wait()
         cpu_s = time.process_time()
         one = asker.ask(trips, 1)
@@ -124,8 +126,9 @@ def _session(link: Link) -> Any:
 
 if __name__ == "__main__":
     die_with_parent()
-    if len(sys.argv) == 3 and not sys.argv[1].isdecimal():
-        answer(*sys.argv[1:])
+    first, second, wall_s = sys.argv[1], sys.argv[2], float(sys.argv[3])
+    if first.isdecimal():
+        ask(int(first), int(second), wall_s)
     else:
-        ask(int(sys.argv[1]), int(sys.argv[2]))
+        answer(first, second, wall_s)
     os._exit(0)

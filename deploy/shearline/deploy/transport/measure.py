@@ -34,12 +34,16 @@ FEW = (1, 4)
 MANY = 256
 MANY_TRIALS = 20_000
 
-#: A trial of the utilisation benchmark takes this long [s]; so many of each evaluator are run.
+#: A trial of the utilisation benchmark takes this long [s]; each evaluator runs so many, here and
+#: with short ones.
 WALL_S = 0.005
 WALL_TRIALS = 400
 
 #: Longest time a whole small run may take before it counts as broken [s].
 PATIENCE_S = 60.0
+
+#: A short trial [s]: the whole key-in-lock takes fifty times as long.
+SHORT_S = 0.001
 
 Figures = dict[str, float]
 
@@ -60,6 +64,8 @@ def measure(
     figures: Figures = {"starts": starts}
     for evaluators in FEW:
         figures |= side_by_side(evaluators, starts, trips, say)
+    say("four evaluators with short trials")
+    figures |= short(starts)
     say("utilisation")
     figures |= utilisation(starts)
     say(f"{MANY} light evaluators")
@@ -77,7 +83,7 @@ def side_by_side(
     for start in range(starts):
         say(f"{evaluators} evaluators, start {start + 1} of {starts}")
         trials = trips * evaluators
-        echo.append(measured("echo", evaluators, trials))
+        echo.append(measured("echo", evaluators, trials, 0.0))
         one.append(measured("path", evaluators, 1, trials, 0.0))
         two.append(measured("path", evaluators, 2, trials, 0.0))
     raw_one, raw_two = [e["one"] for e in echo], [e["two"] for e in echo]
@@ -93,6 +99,19 @@ def side_by_side(
         f"p99{tail}_us": 1e6 * _middle(one, "p99_s"),
         f"rate{tail}_hz": _middle(two, "rate_hz"),
         f"cpu{tail}_us": 1e6 * _middle(two, "cpu_s"),
+    }
+
+
+def short(starts: int) -> Figures:
+    """Compare round trips where four evaluators, and echoes, are at work a millisecond each."""
+    echo, path = [], []
+    for _ in range(starts):
+        echo.append(measured("echo", 4, 4 * WALL_TRIALS, SHORT_S)["one"])
+        path.append(measured("path", 4, 1, 4 * WALL_TRIALS, SHORT_S))
+    return {
+        "short_p50_ratio_4": _middle(path, "p50_s") / _middle(echo, "p50_s"),
+        "short_raw_p50_4_us": 1e6 * _middle(echo, "p50_s"),
+        "short_p50_4_us": 1e6 * _middle(path, "p50_s"),
     }
 
 

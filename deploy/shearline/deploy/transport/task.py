@@ -16,6 +16,15 @@ PARAMETERS = 23
 _SPIN_S = 0.0002
 
 
+def wait(wall_s: float) -> None:
+    """Let a precise time pass [s]."""
+    end_s = time.perf_counter() + wall_s
+    if wall_s > _SPIN_S:
+        time.sleep(wall_s - _SPIN_S)
+    while time.perf_counter() < end_s:
+        pass
+
+
 class WaitTask:
     """A trial that takes a given wall time and always succeeds.
 
@@ -39,10 +48,6 @@ class WaitTask:
 
     def run(self, theta: Array, seed: int, beat: Callable[[], None]) -> Outcome:  # noqa: ARG002
         """Wait; see :class:`shearline.evaluator.base.Task`."""
-        end_s = time.perf_counter() + self._wall_s
-        if self._wall_s > _SPIN_S:
-            time.sleep(self._wall_s - _SPIN_S)
-        while time.perf_counter() < end_s:
-            pass
+        wait(self._wall_s)
         beat()
         return Outcome(cost=1.0, success=True)
