@@ -32,6 +32,9 @@ PATIENCE_S = 90.0
 #: A recorder whose learner was killed ends with it; this is many times what that takes [s].
 LEAVE_S = 10.0
 
+#: How long a trial may be on its way; less than a lease, after which a victim may be tried again.
+ON_ITS_WAY_S = 0.5
+
 
 class Fleet:
     """One run folder, one endpoint, and the children that use them."""
@@ -106,7 +109,7 @@ class Fleet:
         return sum(from_s <= at_s < to_s for at_s in told) / (to_s - from_s)
 
     def taken_over_s(self, victim: str, at_s: float) -> float:
-        """Return when the last trial that a victim was given and never ended ran elsewhere [s].
+        """Return when the last trial that a victim held, and never ended, ran elsewhere [s].
 
         Counted from the moment it was hurt; a result's time less how long it ran is when it began.
         At that very moment it may hold nothing, its next trial still on its way.
@@ -118,6 +121,7 @@ class Fleet:
             for e in entries
             if isinstance(e, AttemptIssued)
             and e.evaluator == victim
+            and e.at_s <= at_s + ON_ITS_WAY_S
             and (e.token not in ended or ended[e.token].at_s > at_s)
         }
         began_s = [
@@ -125,7 +129,7 @@ class Fleet:
             for e in ended.values()
             if e.verdict is Verdict.COUNTED and e.result.trial in held and e.evaluator != victim
         ]
-        assert began_s, f"{victim} left nothing for others"
+        assert began_s, f"{victim} held nothing when it was hurt"
         return max(began_s)
 
     def audit(self) -> Audit:

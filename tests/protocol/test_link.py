@@ -64,6 +64,7 @@ def test_one_thread_receives_unless_the_environment_says_otherwise(
     monkeypatch.delenv("ZENOH_RUNTIME", raising=False)
     open_router(free_endpoint()).close()
     assert "rx: (worker_threads: 1)" in os.environ["ZENOH_RUNTIME"]
+    assert "app: (handover: rx)" in os.environ["ZENOH_RUNTIME"]
     monkeypatch.setenv("ZENOH_RUNTIME", "(rx: (worker_threads: 3))")
     open_router(free_endpoint()).close()
     assert os.environ["ZENOH_RUNTIME"] == "(rx: (worker_threads: 3))"
