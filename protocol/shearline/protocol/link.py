@@ -46,9 +46,11 @@ PUBLISHERS_MAX = 4 * SESSIONS_MAX
 #: have on their way honestly, and bounded memory whatever they send.
 INTAKE_MAX = 1024
 
-#: Threads of Zenoh: one receives, for all sessions of the process, and accepts too. A second one
-#: only takes turns with it: either way all wait once an intake is full.
-_RUNTIME = "(rx: (worker_threads: 1), acc: (handover: rx))"
+#: Threads of Zenoh: one receives, for all sessions of the process, and accepts and connects too. A
+#: second receiver only takes turns with it: either way all wait once an intake is full. A thread
+#: that only connects (``app``) would from then on be woken first by all that comes in, merely to
+#: wake the receiver.
+_RUNTIME = "(rx: (worker_threads: 1), acc: (handover: rx), app: (handover: rx))"
 
 #: Longest single attempt to connect, so that Ctrl-C and a deadline are noticed in between [s].
 _SLICE_S = 0.5
