@@ -80,12 +80,13 @@ def test_a_measurement_that_fails_says_what_its_process_said() -> None:
 @pytest.mark.bench
 def test_the_full_path_is_within_sight_of_a_bare_echo() -> None:
     figures = side_by_side(1, starts=3, trips=400)
+    # Learner and evaluator look on where the echo sleeps: at best they take half of its time.
     assert 0.3 < figures["p50_ratio"] < 12.0
-    assert 0.05 < figures["rate_ratio"] < 2.0
+    assert 0.05 < figures["rate_ratio"] < 1.2
 
 
 @pytest.mark.bench
-def test_a_trial_that_takes_a_while_hides_most_of_the_path() -> None:
+def test_short_trials_are_held_against_echoes_that_take_as_long() -> None:
     figures = short(1)
     assert figures["short_raw_p50_4_us"] >= 1e6 * SHORT_S
     assert 0.8 < figures["short_p50_ratio_4"] < 4.0

@@ -28,10 +28,9 @@ RUN = [
 #: all steps but one in a hundred: at a load of 30 a single one waited 1.9 s for a core.
 BLOCKED_MS = 500.0
 
-#: Attempts of 160 that may lapse. A forgery that was believed would lapse them by the hundred; but
-#: the flood fills the machine too, and where another dozen processes want its two cores an
-#: evaluator is not heard for two seconds in one run of ten.
-LAPSES_MAX = 16
+#: Attempts that may lapse: what three evaluators hold, once. The flood takes what it can of the
+#: machine, and one that is not heard for two seconds, or cut off, is rightly taken for gone.
+LAPSES_MAX = 6
 
 #: What the learner itself may spend on a step, whatever else the machine does [ms].
 STEP_CPU_MS = 50.0
@@ -53,7 +52,7 @@ def test_a_rogue_has_no_effect(tmp_path: Path) -> None:
         assert FORGED_COST not in {result.cost for result in audit.counted.values()}
         assert {e.evaluator for e in entries if isinstance(e, ResultTaken)} <= set(NAMES)
         assert {e.evaluator for e in last.evaluators} == set(NAMES)
-        assert sum(isinstance(e, AttemptLapsed) for e in entries) < LAPSES_MAX
+        assert sum(isinstance(e, AttemptLapsed) for e in entries) <= LAPSES_MAX
         assert log.stat().st_size < 100_000
         noise = re.search(r"malformed (\d+), dropped (\d+)", log.read_text())
         assert noise is not None

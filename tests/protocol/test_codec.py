@@ -317,6 +317,16 @@ def test_a_number_that_is_not_finite_is_never_sent(number: float) -> None:
             encode(message)
 
 
+def test_finite_numbers_whose_sum_is_not_are_sent() -> None:
+    message = msgspec.structs.replace(TRIAL, theta=[1e308, 1e308])
+    assert decode(encode(message), Trial) == message
+
+
+def test_a_whole_number_too_large_for_a_float_is_malformed() -> None:
+    with pytest.raises(ValueError, match="malformed"):
+        encode(msgspec.structs.replace(RESULT, cost=10**400))
+
+
 @pytest.mark.parametrize(
     "message",
     [

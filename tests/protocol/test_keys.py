@@ -126,4 +126,4 @@ def test_a_message_does_not_travel_against_its_direction() -> None:
         KEYS.up("lab", ACK)
     with pytest.raises(ValueError, match="does not travel"):
         KEYS.down("lab", CREDIT)
-    assert topic(type(HOLD), ("cmd",)) == "cmd"
+    assert topic(HOLD, ("cmd",)) == "cmd"

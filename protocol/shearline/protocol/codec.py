@@ -193,10 +193,10 @@ def _struct_is_finite(value: msgspec.Struct) -> bool:
     try:
         for floats in flat:
             # This walk is in every round trip, twice. A sum is finite only if all of it is, and is
-            # had in a fifth of the time; one that overflows leaves it open.
+            # had in half of the time; one that overflows leaves it open.
             if not math.isfinite(sum(floats(value))) and not all(map(math.isfinite, floats(value))):
                 return False
-    except TypeError:  # somebody's object in place of a float: the encoder will say so
+    except (TypeError, OverflowError):  # no float in place of one: the encoder will say so
         return True
     return not deep or all(is_finite(getattr(value, name)) for name in deep)
 

@@ -8,7 +8,6 @@ messages' contents are not known here.
 
 from __future__ import annotations
 
-import functools
 import re
 from dataclasses import dataclass
 
@@ -29,9 +28,6 @@ DOWN_TOPICS = ("trial", "ack", "cmd")
 
 #: Stands where an evaluator's name would; none can have it.
 NOBODY = "-"
-
-#: Keys that are remembered: they repeat, and to make one costs as much as to encode a message.
-PATHS_MAX = 65_536
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _CHUNK = re.compile(r"[A-Za-z0-9_.-]{1,64}")
@@ -89,11 +85,11 @@ class Keys:
 
     def up(self, evaluator: str, message: Message) -> str:
         """Return the key on which an evaluator says this message to the learner."""
-        return _path(self.run, evaluator, type(message), UP_TOPICS)
+        return f"{self.root}/ev/{evaluator}/{topic(message, UP_TOPICS)}"
 
     def down(self, evaluator: str, message: Message) -> str:
         """Return the key on which the learner says this message to one evaluator."""
-        return _path(self.run, evaluator, type(message), DOWN_TOPICS)
+        return f"{self.root}/ev/{evaluator}/{topic(message, DOWN_TOPICS)}"
 
     def all_cmd(self) -> str:
         """Return the key of commands to all evaluators."""
@@ -148,18 +144,13 @@ class Keys:
         return f"{self.root}/live/learner/*"
 
 
-@functools.lru_cache(maxsize=PATHS_MAX)
-def _path(run: str, evaluator: str, kind: type[Message], admitted: tuple[str, ...]) -> str:
-    return f"{ROOT}/{run}/ev/{evaluator}/{topic(kind, admitted)}"
-
-
-def topic(kind: type[Message], admitted: tuple[str, ...]) -> str:
-    """Return the last chunk of the key that carries messages of a kind.
+def topic(message: Message, admitted: tuple[str, ...]) -> str:
+    """Return the last chunk of the key that carries a message.
 
     Raises:
         ValueError: If this kind does not travel in that direction.
     """
-    tag = str(kind.__struct_config__.tag)
+    tag = str(type(message).__struct_config__.tag)
     said = "cmd" if tag in {"welcome", "refused", "command"} else tag
     if said not in admitted:
         raise ValueError(f"a {tag!r} does not travel on {', '.join(admitted)}")
